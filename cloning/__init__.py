@@ -1,0 +1,1 @@
+"""Cloning the motion of an animatable face onto another mesh."""

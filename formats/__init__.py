@@ -1,0 +1,36 @@
+"""File formats. `read` and `write` choose by the file's extension."""
+
+from __future__ import annotations
+
+from formats.registry import (
+    Format,
+    FormatModule,
+    format_of,
+    formats,
+    read,
+    read_face,
+    read_scene,
+    register,
+    write,
+)
+
+register(Format("Wavefront OBJ", (".obj",), "formats.obj"))
+register(Format("PLY", (".ply",), "formats.ply"))
+register(Format("STL", (".stl",), "formats.stl"))
+register(Format("OFF", (".off",), "formats.off"))
+register(Format("glTF 2.0", (".gltf", ".glb"), "formats.gltf", writes=False))
+register(Format("VRML97", (".wrl", ".wrz", ".wrl.gz", ".vrml"), "formats.vrml97", carries_tables=True))
+register(Format("MPEG-4 BT", (".bt", ".bt.gz"), "formats.bt", carries_tables=True))
+register(Format("USD", (".usda", ".usdc", ".usd"), "formats.usd", carries_tables=True))
+
+__all__ = [
+    "Format",
+    "FormatModule",
+    "format_of",
+    "formats",
+    "read",
+    "read_face",
+    "read_scene",
+    "register",
+    "write",
+]

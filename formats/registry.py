@@ -1,0 +1,116 @@
+"""Which module reads and writes which file name. A format module is imported when a file needs it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol, cast
+
+from fat.face import AnimatableFace
+from fba.errors import LandmarkError, UnknownFormatError
+from fba.scene import FaceScene
+
+
+class FormatModule(Protocol):
+    """What a format module offers; a module may lack either function."""
+
+    def read(self, path: Path) -> FaceScene | AnimatableFace:
+        """Read a file; an AnimatableFace when it carries tables."""
+        ...
+
+    def write(self, face: FaceScene | AnimatableFace, path: Path) -> None:
+        """Write a file atomically."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A file format.
+
+    module : import path of its FormatModule.
+    carries_tables : a face written to it reads back with its Facial Animation Tables.
+    """
+
+    name: str
+    extensions: tuple[str, ...]
+    module: str
+    reads: bool = True
+    writes: bool = True
+    carries_tables: bool = False
+
+
+_FORMATS: list[Format] = []
+
+
+def register(entry: Format) -> None:
+    """Add a format; a later one wins over an earlier one with the same extension."""
+    _FORMATS.append(entry)
+
+
+def formats() -> tuple[Format, ...]:
+    """All registered formats."""
+    return tuple(_FORMATS)
+
+
+def format_of(path: Path, *, writing: bool = False) -> Format:
+    """Find the format by the file's extension (compound extensions such as .wrl.gz included).
+
+    Raises
+    ------
+    UnknownFormatError
+        If no format reads (writes) such a name.
+    """
+    name = path.name.lower()
+    for entry in reversed(_FORMATS):
+        if any(name.endswith(e) for e in entry.extensions) and (entry.writes if writing else entry.reads):
+            return entry
+    known = sorted({e for f in _FORMATS if (f.writes if writing else f.reads) for e in f.extensions})
+    verb = "written" if writing else "read"
+    raise UnknownFormatError(
+        f"{path}: files of this kind cannot be {verb}; known extensions: {', '.join(known)}"
+    )
+
+
+def _load(entry: Format, function: str) -> Callable[..., object]:
+    return cast("Callable[..., object]", getattr(import_module(entry.module), function))
+
+
+def read(path: str | Path) -> FaceScene | AnimatableFace:
+    """Read a scene or, when the file carries tables, an animatable face; "default" is the shipped source."""
+    if str(path) == "default":
+        from samples import default_source
+
+        path = default_source()
+    path = Path(path)
+    return cast("FaceScene | AnimatableFace", _load(format_of(path), "read")(path))
+
+
+def read_scene(path: str | Path) -> FaceScene:
+    """Read a file and return its scene, whether or not it carries tables."""
+    found = read(path)
+    return found.scene if isinstance(found, AnimatableFace) else found
+
+
+def read_face(path: str | Path) -> AnimatableFace:
+    """Read an animatable face.
+
+    Raises
+    ------
+    LandmarkError
+        If the file has no Facial Animation Tables.
+    """
+    found = read(path)
+    if isinstance(found, AnimatableFace):
+        return found
+    raise LandmarkError(
+        f"{path} holds no Facial Animation Tables, so it cannot move yet. Make it animatable with: "
+        f"fba clone {path} -o OUT.wrl --landmarks POINTS.json"
+    )
+
+
+def write(face: FaceScene | AnimatableFace, path: str | Path) -> None:
+    """Write a face; the extension chooses the format. The file is written whole or not at all."""
+    path = Path(path)
+    _load(format_of(path, writing=True), "write")(face, path)
