@@ -131,9 +131,7 @@ class FaceDefTables:
         keys = [t.key for t in ordered]
         if len(set(keys)) != len(keys):
             twice = next(k for i, k in enumerate(keys) if k in keys[:i])
-            raise FaceDefTablesError(
-                f"two FaceDefTables for {table_name(*twice)} (fapID {twice[0]}); merge them"
-            )
+            raise FaceDefTablesError(f"two FaceDefTables for {table_name(*twice)} (fapID {twice[0]}); merge them")
         object.__setattr__(self, "tables", ordered)
 
     def __iter__(self) -> Iterator[FaceDefTable]:

@@ -114,9 +114,7 @@ class FeaturePoints(Mapping[str, FeaturePoint]):
             names = ", ".join(f"{i} ({feature_point_definitions()[i].definition})" for i in missing)
             raise LandmarkError(f"{purpose} needs feature points that are not given: {names}")
 
-    def positions(
-        self, scene: FaceScene, world_vertices: Mapping[str, Floats] | None = None
-    ) -> dict[str, Floats]:
+    def positions(self, scene: FaceScene, world_vertices: Mapping[str, Floats] | None = None) -> dict[str, Floats]:
         """World position (3,) of every point on the neutral scene, or on the given world vertices of its shapes."""
         cache: dict[str, Floats] = {} if world_vertices is None else dict(world_vertices)
         out: dict[str, Floats] = {}

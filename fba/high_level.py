@@ -47,9 +47,7 @@ VISEMES: tuple[Viseme, ...] = (
 EXPRESSIONS: tuple[Expression, ...] = (
     Expression(1, "joy", "brows relaxed, mouth open, corners pulled back toward the ears"),
     Expression(2, "sadness", "inner brows bent up, eyes slightly closed, mouth relaxed"),
-    Expression(
-        3, "anger", "inner brows pulled down and together, eyes wide, lips pressed or opened on the teeth"
-    ),
+    Expression(3, "anger", "inner brows pulled down and together, eyes wide, lips pressed or opened on the teeth"),
     Expression(4, "fear", "brows raised and pulled together, inner brows bent up, eyes tense and alert"),
     Expression(5, "disgust", "brows and lids relaxed, upper lip raised and curled, often asymmetric"),
     Expression(6, "surprise", "brows raised, upper lids wide open and lower lids relaxed, jaw opened"),

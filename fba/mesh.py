@@ -84,7 +84,7 @@ class PolyMesh:
         """Build a mesh from a list of polygons (corner lists of any length) or an (m, c) array."""
         rows = [np.asarray(f, dtype=np.int32) for f in faces]  # type: ignore[union-attr]
         offsets = np.concatenate([[0], np.cumsum([len(r) for r in rows])])
-        indices = np.concatenate(rows) if rows else np.zeros(0)
+        indices = np.concatenate(rows) if rows else np.zeros(0, dtype=np.int32)
         return cls(np.asarray(vertices, dtype=np.float64), indices, offsets)
 
     @property
@@ -204,11 +204,9 @@ class PolyMesh:
         ids = np.flatnonzero(vertex_mask).astype(np.int32)
         new = np.full(self.vertex_count, -1, dtype=np.int32)
         new[ids] = np.arange(ids.size)
-        inside = (
-            np.logical_and.reduceat(vertex_mask[self.indices], self.offsets[:-1])
-            if self.face_count
-            else np.zeros(0, bool)
-        )
+        inside = np.zeros(0, dtype=bool)
+        if self.face_count:
+            inside = np.logical_and.reduceat(vertex_mask[self.indices], self.offsets[:-1])
         corner = np.repeat(inside, self.arities)
         offsets = np.concatenate([[0], np.cumsum(self.arities[inside])])
         texcoords, texcoord_indices = _compact(self.texcoords, self.texcoord_indices, corner)
@@ -237,7 +235,8 @@ class PolyMesh:
             for corner in range(3):
                 normals[:, axis] += np.bincount(self.triangles[:, corner], cross[:, axis], self.vertex_count)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
-        return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+        unit: Floats = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+        return unit
 
 
 def _compact(values: Floats | None, indices: Ints | None, corner: Bools) -> tuple[Floats | None, Ints | None]:

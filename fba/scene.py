@@ -50,9 +50,7 @@ class Shape:
         if self.vertex_ids is not None:
             ids = frozen(self.vertex_ids, np.int32, (-1,))
             if ids.size != self.mesh.vertex_count:
-                raise MeshError(
-                    f"shape '{self.name}': {ids.size} vertex ids for {self.mesh.vertex_count} vertices"
-                )
+                raise MeshError(f"shape '{self.name}': {ids.size} vertex ids for {self.mesh.vertex_count} vertices")
             object.__setattr__(self, "vertex_ids", ids)
 
 
@@ -140,7 +138,8 @@ class Frame:
 def _signed(vectors: Floats, axes: Floats) -> Floats:
     source = np.argmax(np.abs(axes), axis=1)
     sign = axes[np.arange(3), source]
-    return vectors[..., source] * sign
+    turned: Floats = vectors[..., source] * sign
+    return turned
 
 
 @dataclass(frozen=True, eq=False)

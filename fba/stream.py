@@ -60,9 +60,7 @@ class FapStream:
             len(self.frame_numbers),
         }
         if len(counts) != 1:
-            raise FapStreamError(
-                f"the arrays of a FAP stream have different numbers of frames: {sorted(counts)}"
-            )
+            raise FapStreamError(f"the arrays of a FAP stream have different numbers of frames: {sorted(counts)}")
         if not (np.isfinite(self.frame_rate) and self.frame_rate > 0):
             raise FapStreamError(f"the frame rate must be a positive number, not {self.frame_rate}")
 
@@ -88,7 +86,5 @@ class FapStream:
         high = []
         for k, fields, width in ((0, visemes, 4), (1, expressions, 6)):
             mask[:, k] = fields is not None
-            high.append(
-                np.zeros((frames, width), np.int32) if fields is None else np.asarray(fields, np.int32)
-            )
-        return cls(frame_rate, values, mask, high[0], high[1], np.arange(frames), name)
+            high.append(np.zeros((frames, width), np.int32) if fields is None else np.asarray(fields, np.int32))
+        return cls(frame_rate, values, mask, high[0], high[1], np.arange(frames, dtype=np.int32), name)

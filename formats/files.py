@@ -49,9 +49,7 @@ def atomic_output(path: Path) -> Iterator[Path]:
     if path.is_dir():
         raise OutputFileError(f"cannot write {path}: a folder of that name exists")
     try:
-        handle, name = tempfile.mkstemp(
-            suffix="".join(path.suffixes[-2:]), prefix=f".{path.stem[:32]}-", dir=folder
-        )
+        handle, name = tempfile.mkstemp(suffix="".join(path.suffixes[-2:]), prefix=f".{path.stem[:32]}-", dir=folder)
         os.close(handle)
     except OSError as error:
         raise OutputFileError(

@@ -68,9 +68,7 @@ def format_of(path: Path, *, writing: bool = False) -> Format:
             return entry
     known = sorted({e for f in _FORMATS if (f.writes if writing else f.reads) for e in f.extensions})
     verb = "written" if writing else "read"
-    raise UnknownFormatError(
-        f"{path}: files of this kind cannot be {verb}; known extensions: {', '.join(known)}"
-    )
+    raise UnknownFormatError(f"{path}: files of this kind cannot be {verb}; known extensions: {', '.join(known)}")
 
 
 def _load(entry: Format, function: str) -> Callable[..., object]:
