@@ -1,0 +1,103 @@
+"""Writing Wavefront OBJ from a scene, with its material library beside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fba.arrays import Floats, Ints
+from fba.scene import FaceScene
+from formats.files import write_bytes
+from formats.gathered import GatheredMesh, gather_mesh, original_order
+from formats.mtl import format_mtl
+
+
+def write_obj(
+    scene: FaceScene,
+    path: Path,
+    *,
+    polygons: tuple[Ints, Ints] | None = None,
+    objects: bool = True,
+    colors: Floats | None = None,
+) -> None:
+    """Write the scene's neutral mesh as one vertex list.
+
+    Parameters
+    ----------
+    polygons : (indices, offsets) of the file that was read: when the scene still holds exactly these
+        polygons, they are written in this order; otherwise shape by shape.
+    objects : name the shapes as objects (``o``) when there are several.
+    colors : (N, k) values written behind the vertices, when N still fits.
+
+    Raises
+    ------
+    OutputFileError
+        If the file cannot be written.
+    """
+    gathered = gather_mesh(scene)
+    if polygons is not None:
+        order = original_order(gathered.mesh, *polygons)
+        if order is not None:
+            gathered = gathered.reordered(order)
+    mesh = gathered.mesh
+    library = path.with_suffix(".mtl")
+    lines: list[str] = []
+    if gathered.materials:
+        lines.append(f"mtllib {library.name}")
+    vertices = (
+        mesh.vertices if colors is None or len(colors) != mesh.vertex_count else np.hstack([mesh.vertices, colors])
+    )
+    lines += _rows("v", vertices)
+    if mesh.texcoords is not None:
+        lines += _rows("vt", mesh.texcoords)
+    if mesh.normals is not None:
+        lines += _rows("vn", mesh.normals)
+    lines += _faces(gathered, objects)
+    if gathered.materials:
+        write_bytes(library, format_mtl(gathered.materials).encode())
+    write_bytes(path, ("\n".join(lines) + "\n").encode())
+
+
+def _rows(keyword: str, values: Floats) -> list[str]:
+    line = " ".join([keyword, *["{!r}"] * values.shape[1]]).format
+    return list(map(line, *values.T.tolist()))
+
+
+def _faces(gathered: GatheredMesh, objects: bool) -> list[str]:
+    mesh = gathered.mesh
+    corners = _corners(gathered)
+    offsets = mesh.offsets.tolist()
+    state: list[tuple[str, list[int], tuple[str, ...]]] = []
+    if objects and (len(gathered.shape_names) > 1 or gathered.shape_names[0] != "face"):
+        state.append(("o", gathered.shape_of_face.tolist(), gathered.shape_names))
+    if mesh.face_groups is not None:
+        state.append(("g", mesh.face_groups.tolist(), mesh.group_names))
+    if mesh.face_materials is not None:
+        # Index -1 (no material) falls on the last name.
+        names = (*(m.name or f"material_{i}" for i, m in enumerate(gathered.materials)), "default")
+        state.append(("usemtl", mesh.face_materials.tolist(), names))
+    now: list[int | None] = [-1 if keyword == "usemtl" else None for keyword, _, _ in state]
+    lines: list[str] = []
+    for i in range(mesh.face_count):
+        for k, (keyword, numbers, names) in enumerate(state):
+            if numbers[i] != now[k]:
+                now[k] = numbers[i]
+                lines.append(f"{keyword} {names[numbers[i]]}")
+        lines.append("f " + " ".join(corners[offsets[i] : offsets[i + 1]]))
+    return lines
+
+
+def _corners(gathered: GatheredMesh) -> list[str]:
+    mesh = gathered.mesh
+    vertex = (mesh.indices + 1).tolist()
+    absent = np.full(mesh.indices.size, -1)
+    texcoord = (absent if mesh.texcoord_indices is None else mesh.texcoord_indices).tolist()
+    normal = (absent if mesh.normal_indices is None else mesh.normal_indices).tolist()
+    if mesh.texcoord_indices is None and mesh.normal_indices is None:
+        return list(map(str, vertex))
+    out = []
+    for v, t, n in zip(vertex, texcoord, normal, strict=True):
+        uv = str(t + 1) if t >= 0 else ""
+        out.append(f"{v}/{uv}/{n + 1}" if n >= 0 else f"{v}/{uv}" if uv else str(v))
+    return out
