@@ -1,0 +1,21 @@
+"""Pictures of faces, with or without a graphics library."""
+
+from __future__ import annotations
+
+from studio.render.camera import Camera, frame_face
+from studio.render.drawable import Drawable, Iris
+from studio.render.figure import Figure, Style, render_pose
+from studio.render.protocol import Renderer, RendererError, make_renderer
+
+__all__ = [
+    "Camera",
+    "Drawable",
+    "Figure",
+    "Iris",
+    "Renderer",
+    "RendererError",
+    "Style",
+    "frame_face",
+    "make_renderer",
+    "render_pose",
+]
