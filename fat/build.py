@@ -149,7 +149,7 @@ def _inverse_linear(scene: FaceScene, name: str) -> Floats | None:
     if np.array_equal(linear, np.eye(3)):
         return None
     try:
-        inverse: Floats = np.linalg.inv(linear)
+        inverse: Floats = np.linalg.inv(linear).astype(np.float64, copy=False)
     except np.linalg.LinAlgError:
         raise FaceDefTablesError(f"shape '{name}' is scaled to nothing by the transforms above it") from None
     return inverse

@@ -2,10 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fba.arrays import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class IntervalRule:
+    """The intervals of one FaceDefMesh: ``weight = sign * (clip(value, low, high) - origin)``, each (b-1,)."""
+
+    low: Floats
+    high: Floats
+    origin: Floats
+    sign: Floats
+
+
+def interval_rule(borders: Ints) -> IntervalRule:
+    """Return the rule of these borders; see `interval_weights`."""
+    edges = np.asarray(borders, dtype=np.float64)
+    low, high = edges[:-1].copy(), edges[1:].copy()
+    low[0], high[-1] = -np.inf, np.inf
+    if edges.size == 2:
+        return IntervalRule(low, high, np.zeros(1), np.ones(1))
+    below = edges[1:] <= 0.0
+    return IntervalRule(low, high, np.where(below, edges[1:], edges[:-1]), np.where(below, -1.0, 1.0))
 
 
 def interval_weights(borders: Ints, values: ArrayLike) -> Floats:
@@ -32,12 +55,7 @@ def interval_weights(borders: Ints, values: ArrayLike) -> Floats:
     >>> interval_weights(np.array([-1000, 0, 500, 1000]), 600).tolist()
     [0.0, 500.0, 100.0]
     """
+    rule = interval_rule(borders)
     value = np.asarray(values, dtype=np.float64)[..., None]
-    edges = np.asarray(borders, dtype=np.float64)
-    if edges.size == 2:
-        return value.copy()
-    low, high = edges[:-1].copy(), edges[1:].copy()
-    low[0], high[-1] = -np.inf, np.inf
-    within = np.clip(value, low, high)
-    weights: Floats = np.where(edges[1:] <= 0.0, edges[1:] - within, within - edges[:-1])
+    weights: Floats = rule.sign * (np.clip(value, rule.low, rule.high) - rule.origin)
     return weights
