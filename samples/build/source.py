@@ -1,0 +1,67 @@
+"""Assemble the shipped source face."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fat.build import build_tables
+from fat.face import AnimatableFace
+from fat.motion import FaceMotion
+from fat.rig import RigTables, rig_eye, rig_head
+from fat.tables import table_name
+from fba.fapu import FAPU_DIVISOR
+from samples.build.head import Head, build_head, macro
+from samples.build.high_level import high_level_motions
+from samples.build.low_level import RECIPES
+from samples.build.makehuman import MakeHuman
+from samples.build.motions import MotionBuilder
+from samples.build.neutral import neutral
+
+RACES = {"caucasian": 0.35, "asian": 0.35, "african": 0.3}
+SEXES = {"female": 0.6, "male": 0.4}
+THRUST = 300
+"""Border of the eyeball thrust, FAP 27 and 28."""
+
+
+def source_head(makehuman: MakeHuman) -> Head:
+    """The source's neutral head: a mixture of all races and both sexes, brought to the neutral pose."""
+    mixture: dict[tuple[str, str], float] = {}
+    for race, share in RACES.items():
+        for sex, part in SEXES.items():
+            for key, weight in macro(race, sex, "young", share * part).items():
+                mixture[key] = mixture.get(key, 0.0) + weight
+    return neutral(build_head(makehuman, mixture, "source"))
+
+
+def build_source(makehuman: MakeHuman) -> AnimatableFace:
+    """The animatable source: scene with nested eye and head rotations, feature points, tables."""
+    head = source_head(makehuman)
+    builder = MotionBuilder(head)
+    motions = [builder.fap_motion(recipe, border) for recipe in RECIPES for border in recipe.borders]
+    motions += eye_thrusts(head)
+    motions += high_level_motions(builder)
+    scene, transforms = _rig(head)
+    tables = build_tables(scene, head.fapu, motions, transforms)
+    notes = {"open_jaw": "practical"} | {table_name(r.fap): r.note for r in RECIPES if r.note}
+    return AnimatableFace(scene, head.points, tables, head.fapu, notes)
+
+
+def eye_thrusts(head: Head) -> list[FaceMotion]:
+    """FAPs 27 and 28: the whole eyeball moves along +Z."""
+    out = []
+    for fap_id, shape in ((27, "eye_left"), (28, "eye_right")):
+        count = head.scene.shape(shape).mesh.vertex_count
+        offsets = np.tile([0.0, 0.0, THRUST * head.fapu.es0 / FAPU_DIVISOR], (count, 1))
+        out.append(FaceMotion(table_name(fap_id), fap_id, 1, THRUST, {shape: offsets}))
+    return out
+
+
+def _rig(head: Head) -> tuple[object, RigTables]:
+    scene = head.scene
+    tables: RigTables = {}
+    for side in ("left", "right"):
+        name = f"eye_{side}"
+        scene, more = rig_eye(scene, side, [name], head.eye_centers[name][0])
+        tables |= more
+    scene, more = rig_head(scene, head.positions["7.1"])
+    return scene, tables | more
