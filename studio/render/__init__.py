@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from studio.render.camera import Camera, frame_face
 from studio.render.drawable import Drawable, Iris
-from studio.render.figure import Figure, Style, render_pose
+from studio.render.figure import Figure, Style, face_camera, render_pose
 from studio.render.protocol import Renderer, RendererError, make_renderer
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "Renderer",
     "RendererError",
     "Style",
+    "face_camera",
     "frame_face",
     "make_renderer",
     "render_pose",

@@ -49,9 +49,8 @@ EYES = (Role.EYE_LEFT, Role.EYE_RIGHT)
 _PLAIN = Material().diffuse
 
 
-def shape_colors(shape: Shape, triangles_of: Floats | None = None) -> Floats:
+def shape_colors(shape: Shape) -> Floats:
     """Colours of one shape: (3,), or (t, 3) where its faces differ."""
-    del triangles_of
     mesh = shape.mesh
     if mesh.face_materials is not None and shape.materials:
         table = np.array([*(material_color(m, shape) for m in shape.materials), natural_color(shape.role, shape.name)])

@@ -86,7 +86,9 @@ def _program() -> tuple[Any, Any]:
     except ImportError:
         raise MissingDependencyError("moderngl", "render", "the EGL renderer") from None
     try:
-        context = moderngl.create_context(standalone=True, backend="egl", require=330)
+        # moderngl's own annotation of the backend (a dict) is wrong: it is passed on by name.
+        settings: dict[str, Any] = {"backend": "egl"}
+        context = moderngl.create_context(standalone=True, require=330, **settings)
         program = context.program(vertex_shader=VERTEX_SHADER, fragment_shader=_fragment_source().lstrip())
     except Exception as error:  # moderngl raises plain Exception and OSError alike when EGL is missing
         raise RendererError(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fat.face import AnimatableFace
 from fba.arrays import Floats, Ints
 from fba.feature_points import FeaturePoints
 from fba.scene import FaceScene, Role, Shape
@@ -72,6 +73,11 @@ class Figure:
         if self.style.occlusion and self._parts:
             self._parts = self._shaded()
 
+    @classmethod
+    def of_face(cls, face: AnimatableFace, style: Style | None = None) -> Figure:
+        """The figure of an animatable face, framed by its feature points."""
+        return cls(face.scene, face.feature_points, style)
+
     def drawables(self, world_shapes: Mapping[str, Floats] | None = None) -> list[Drawable]:
         """Everything to draw in one pose: shape name -> (n, 3) world vertices; absent shapes stay neutral."""
         out = []
@@ -134,6 +140,11 @@ def _darkened(part: _Part, open_sky: Floats) -> _Part:
     return _Part(part.shape, part.triangles, part.color * tint, part.places, part.iris)
 
 
+def face_camera(face: AnimatableFace) -> Camera:
+    """The camera in front of an animatable face."""
+    return frame_face(face.scene, face.feature_points)
+
+
 def render_pose(
     scene: FaceScene,
     world_shapes: Mapping[str, Floats] | None = None,
@@ -142,7 +153,7 @@ def render_pose(
     style: Style | None = None,
     renderer: Renderer | None = None,
 ) -> UInt8:
-    """Take one picture of a scene; for many poses of one scene keep a `Figure`.
+    """Take one picture of a scene; for many poses of one scene keep a `Figure`, whose preparation costs most.
 
     Parameters
     ----------

@@ -7,6 +7,7 @@ result belongs to the surface and moves with it: the inside of a mouth stays dar
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def ambient_occlusion(
         total += weight
         lit += weight * _visible(vertices, triangles, direction, radius)
     open_sky = np.divide(lit, total, out=np.ones_like(lit), where=total > 0)
-    return [open_sky[a:b] for a, b in zip(counts[:-1], counts[1:], strict=True)]
+    return [open_sky[a:b] for a, b in pairwise(counts)]
 
 
 def _visible(vertices: Floats, triangles: Ints, direction: Floats, radius: float) -> Floats:

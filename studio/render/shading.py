@@ -89,7 +89,8 @@ def _lambert(nx: Floats32, ny: Floats32, nz: Floats32, light: tuple[float, float
     out = nx * x + ny * y + nz * z
     if wrap:
         out += np.float32(wrap / (1.0 + wrap))
-    return np.maximum(out, 0, out=out)
+    np.maximum(out, 0, out=out)
+    return out
 
 
 def paint_iris(albedo: Floats32, directions: Floats32, angle: float, color: tuple[float, float, float]) -> Floats32:
