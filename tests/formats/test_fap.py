@@ -126,9 +126,9 @@ def test_an_extra_mask_column_is_dropped_with_its_value() -> None:
 @pytest.mark.parametrize(
     ("numbers", "line", "kept"),
     [
-        ((1, 3), "0 4 50", {}),
-        ((2, 3), "0 4 50", {}),
-        ((1, 2, 3), "0 4 6 50", {}),
+        ((1, 3), "0 4 50", set()),
+        ((2, 3), "0 4 50", set()),
+        ((1, 2, 3), "0 4 6 50", set()),
         ((1, 2, 3), "0 4 6 1 2 3 4 5 50", {2}),
     ],
 )
