@@ -1,0 +1,83 @@
+"""Named backends: ways to carry the skin's motion from one face to another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Protocol, cast
+
+from cloning.prepare import PreparedFace
+from fba.arrays import Floats
+from fba.errors import CloningError
+
+
+class SkinTransfer(Protocol):
+    """Carries offsets of a source's skin to a target's skin; built once for a pair of faces."""
+
+    @property
+    def measures(self) -> Mapping[str, float]:
+        """Health of the correspondence, for the report."""
+        ...
+
+    @property
+    def parameters(self) -> Mapping[str, float | str | bool]:
+        """What it was built with, for the report."""
+        ...
+
+    def apply(self, motions: Floats) -> Floats:
+        """(n_source, K, 3) offsets to (n_target, K, 3), mesh units of each face."""
+        ...
+
+
+Builder = Callable[[PreparedFace, PreparedFace, bool], SkinTransfer]
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """A registered backend.
+
+    Attributes
+    ----------
+    name : as given to `clone`.
+    title : the method in a few words.
+    module : import path of the module that offers ``build_transfer(source, target, as_published)``.
+    """
+
+    name: str
+    title: str
+    module: str
+
+    def build(self, source: PreparedFace, target: PreparedFace, as_published: bool) -> SkinTransfer:
+        """Prepare the transfer between two faces."""
+        builder = cast("Builder", import_module(self.module).build_transfer)
+        return builder(source, target, as_published)
+
+
+_BACKENDS: dict[str, Backend] = {}
+
+
+def register_backend(entry: Backend) -> None:
+    """Add a backend; a later one of the same name replaces an earlier one."""
+    _BACKENDS[entry.name] = entry
+
+
+def backends() -> tuple[Backend, ...]:
+    """All registered backends."""
+    return tuple(_BACKENDS.values())
+
+
+def find_backend(name: str) -> Backend:
+    """Return the backend of this name.
+
+    Raises
+    ------
+    CloningError
+        If there is none.
+    """
+    if name not in _BACKENDS:
+        raise CloningError(f"there is no backend '{name}'; choose one of: {', '.join(_BACKENDS)}")
+    return _BACKENDS[name]
+
+
+register_backend(Backend("fmc", "Facial Motion Cloning (Pandzic 2001)", "cloning.fmc"))

@@ -1,0 +1,287 @@
+"""Make a face animatable: clone every motion of a source onto it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from cloning.backends import find_backend
+from cloning.parts import PUPILS, eye_center
+from cloning.prepare import PreparedFace, prepare
+from cloning.report import CloneReport
+from cloning.source import source_motions, turning_keys
+from cloning.transfer import FaceTransfer, build_face_transfer
+from fat.build import build_tables
+from fat.face import AnimatableFace
+from fat.motion import FaceMotion
+from fat.rig import EYE_FAPS, HEAD_FAPS, rig_eye, rig_head
+from fat.tables import FaceDefTransform
+from fba.arrays import Floats
+from fba.errors import CloningError, LandmarkError
+from fba.feature_points import FeaturePoints
+from fba.findings import Finding
+from fba.orientation import to_file_order
+from fba.scene import FaceScene, Role
+from fba.shapes import ShapeSet
+
+Progress = Callable[[str, float], None]
+Key = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class _Stages:
+    """Times each stage and tells the caller about it."""
+
+    progress: Progress | None
+    timings: dict[str, float]
+
+    def run(self, name: str, work: Callable[[], object]) -> object:
+        if self.progress is not None:
+            self.progress(name, 0.0)
+        start = perf_counter()
+        done = work()
+        self.timings[name] = self.timings.get(name, 0.0) + perf_counter() - start
+        if self.progress is not None:
+            self.progress(name, 1.0)
+        return done
+
+
+def clone(
+    source: AnimatableFace,
+    onto: FaceScene | AnimatableFace,
+    landmarks: FeaturePoints | None = None,
+    *,
+    backend: str = "fmc",
+    as_published: bool = False,
+    faps: Collection[int] | None = None,
+    progress: Progress | None = None,
+) -> AnimatableFace:
+    """Clone every motion of a source onto a face.
+
+    See `clone_with_report`.
+    """
+    return clone_with_report(
+        source, onto, landmarks, backend=backend, as_published=as_published, faps=faps, progress=progress
+    )[0]
+
+
+def clone_with_report(
+    source: AnimatableFace,
+    onto: FaceScene | AnimatableFace,
+    landmarks: FeaturePoints | None = None,
+    *,
+    backend: str = "fmc",
+    as_published: bool = False,
+    faps: Collection[int] | None = None,
+    progress: Progress | None = None,
+) -> tuple[AnimatableFace, CloneReport]:
+    """Clone every motion of a source onto a face, and say what was done.
+
+    Parameters
+    ----------
+    source : a face with Facial Animation Tables.
+    onto : the target; its vertices, their order, polygons and materials stay as they are.
+    landmarks : feature points of the target; None uses those that `onto` carries.
+    backend : name of a registered backend.
+    as_published : run the paper's own method instead of the repaired default.
+    faps : FAP numbers to clone, 1 (visemes) and 2 (expressions) among them; None = all.
+    progress : called with (stage, share done).
+
+    Returns
+    -------
+    face : the target with tables of its own.
+    report : measures, findings and timings.
+
+    Raises
+    ------
+    LandmarkError
+        If feature points are missing.
+    CloningError
+        If the backend is not known or the source has no motion of these FAPs.
+    """
+    way = find_backend(backend)
+    stages = _Stages(progress, {})
+    scene, points = _target(onto, landmarks)
+    mine, yours, transfer = _build(source.scene, source.feature_points, scene, points, way.name, as_published, stages)
+    wanted = None if faps is None else frozenset(faps)
+    motions, turning = _read_source(source, mine.scene, wanted)
+    if not motions and not turning:
+        raise CloningError(
+            f"the source '{source.scene.name}' holds no motion" + (" of these FAPs" if wanted else "") + " to clone"
+        )
+    offsets = _carry(transfer, [m.offsets for m in motions], stages)
+    cloned = [replace(m, offsets=o) for m, o in zip(motions, offsets, strict=True) if o]
+    rigged, transforms, said = _rig(yours, turning, wanted, as_published)
+    tables = stages.run("tables", lambda: build_tables(rigged, yours.fapu, cloned, transforms))
+    face = AnimatableFace(
+        rigged,
+        yours.points,
+        tables,  # type: ignore[arg-type]
+        yours.fapu,
+        {**source.notes, "backend": way.name + (" as published" if as_published else ""), "source": source.scene.name},
+    )
+    return face, _report(transfer, way.name, as_published, len(motions), stages, said)
+
+
+def clone_shapes(
+    source: FaceScene,
+    source_points: FeaturePoints,
+    shapes: ShapeSet,
+    onto: FaceScene | AnimatableFace,
+    landmarks: FeaturePoints | None = None,
+    *,
+    backend: str = "fmc",
+    as_published: bool = False,
+    progress: Progress | None = None,
+) -> tuple[ShapeSet, CloneReport]:
+    """Clone free expressions: any named morph targets, as they are.
+
+    Parameters
+    ----------
+    shapes : morph targets of the source in its file's own axes, units and vertex order.
+
+    Returns
+    -------
+    shapes : the same names on the target, in the target's file's own axes, units and vertex order.
+    report : measures, findings and timings.
+    """
+    way = find_backend(backend)
+    stages = _Stages(progress, {})
+    scene, points = _target(onto, landmarks)
+    if shapes.neutral.shape[0] != source.vertex_count:
+        raise CloningError(
+            f"the morph targets have {shapes.neutral.shape[0]} vertices, but the source '{source.name}' has "
+            f"{source.vertex_count}; they must be of the same file"
+        )
+    mine, yours, transfer = _build(source, source_points, scene, points, way.name, as_published, stages)
+    motions = [mine.scene.scatter(mine.scene.frame.from_file(delta)) for delta in shapes.deltas]
+    offsets = _carry(transfer, motions, stages)
+    rest = {s.name: np.zeros((s.mesh.vertex_count, 3)) for s in yours.scene.shapes}
+    deltas = np.stack([to_file_order(yours.scene, yours.scene.gather({**rest, **o})) for o in offsets])
+    neutral = to_file_order(yours.scene, yours.scene.world_neutral())
+    return ShapeSet(shapes.names, neutral, deltas), _report(
+        transfer, way.name, as_published, len(motions), stages, []
+    )
+
+
+def _target(onto: FaceScene | AnimatableFace, landmarks: FeaturePoints | None) -> tuple[FaceScene, FeaturePoints]:
+    if isinstance(onto, AnimatableFace):
+        return onto.scene, onto.feature_points if landmarks is None else landmarks
+    if landmarks is None:
+        raise LandmarkError(
+            f"'{onto.name}' carries no feature points. Give them as landmarks: a file NAME.fps.json beside the mesh, "
+            "or --landmarks POINTS.json"
+        )
+    return onto, landmarks
+
+
+def _build(
+    source: FaceScene,
+    source_points: FeaturePoints,
+    target: FaceScene,
+    target_points: FeaturePoints,
+    backend: str,
+    as_published: bool,
+    stages: _Stages,
+) -> tuple[PreparedFace, PreparedFace, FaceTransfer]:
+    mine = stages.run("source", lambda: prepare(source, source_points, "source"))
+    yours = stages.run("target", lambda: prepare(target, target_points, "target"))
+    assert isinstance(mine, PreparedFace)
+    assert isinstance(yours, PreparedFace)
+    skin = stages.run("correspondence", lambda: find_backend(backend).build(mine, yours, as_published))
+    transfer = stages.run("parts", lambda: build_face_transfer(mine, yours, skin, as_published))  # type: ignore[arg-type]
+    assert isinstance(transfer, FaceTransfer)
+    return mine, yours, transfer
+
+
+def _read_source(
+    source: AnimatableFace, prepared: FaceScene, wanted: frozenset[int] | None
+) -> tuple[list[FaceMotion], frozenset[Key]]:
+    """Motions of the source, in terms of the shapes and axes that it has after preparation."""
+    motions = source_motions(source, wanted)
+    same = np.array_equal(source.scene.frame.axes, prepared.frame.axes)
+    if not same or [s.name for s in source.scene.shapes] != [s.name for s in prepared.shapes]:
+        motions = [replace(m, offsets=_reshaped(m.offsets, source.scene, prepared)) for m in motions]
+    return motions, turning_keys(source)
+
+
+def _reshaped(offsets: Mapping[str, Floats], old: FaceScene, new: FaceScene) -> dict[str, Floats]:
+    rest = {s.name: np.zeros((s.mesh.vertex_count, 3)) for s in old.shapes}
+    joined = new.frame.from_file(old.frame.to_file(old.gather({**rest, **offsets})))
+    return {name: part for name, part in new.scatter(joined).items() if np.any(part)}
+
+
+def _carry(
+    transfer: FaceTransfer, motions: Sequence[Mapping[str, Floats]], stages: _Stages
+) -> list[dict[str, Floats]]:
+    start = perf_counter()
+    progress = stages.progress
+    tick = None if progress is None else (lambda share: progress("motion", share))
+    offsets = transfer.apply(motions, tick)
+    stages.timings["motion"] = perf_counter() - start
+    return offsets
+
+
+def _rig(
+    target: PreparedFace, turning: frozenset[Key], wanted: frozenset[int] | None, as_published: bool
+) -> tuple[FaceScene, dict[Key, Sequence[FaceDefTransform]], list[Finding]]:
+    """Insert the transforms of eyes and head; in published mode only where the source has them."""
+    scene = target.scene
+    tables: dict[Key, Sequence[FaceDefTransform]] = {}
+    findings: list[Finding] = []
+
+    def asked(numbers: Sequence[int]) -> bool:
+        return any(wanted is None or n in wanted for n in numbers)
+
+    for pupil, role in PUPILS.items():
+        side = "left" if role is Role.EYE_LEFT else "right"
+        numbers = [n for _, n in EYE_FAPS[side]]
+        shapes = [s.name for s in scene.with_role(role)]
+        if not shapes or not asked(numbers):
+            continue
+        if as_published and not any((n, 1) in turning for n in numbers):
+            findings.append(_no_node(f"the source's {side} eye", numbers, scene.name))
+            continue
+        vertices = np.concatenate([scene.world_vertices(name) for name in shapes])
+        scene, more = rig_eye(scene, side, shapes, eye_center(vertices, target.place(pupil)))
+        tables.update(more)
+    numbers = [n for _, n in HEAD_FAPS]
+    if asked(numbers):
+        if as_published and not any((n, 1) in turning for n in numbers):
+            findings.append(_no_node("the source's head", numbers, scene.name))
+        else:
+            scene, more = rig_head(scene, target.place("7.2" if as_published else "7.1"))
+            tables.update(more)
+    kept = {key: value for key, value in tables.items() if wanted is None or key[0] in wanted}
+    return scene, kept, findings
+
+
+def _no_node(what: str, numbers: Sequence[int], where: str) -> Finding:
+    listed = ", ".join(map(str, numbers))
+    return Finding("warning", "no-transform", f"{what} has no transform that moves; FAPs {listed} are left out", where)
+
+
+def _report(
+    transfer: FaceTransfer,
+    backend: str,
+    as_published: bool,
+    count: int,
+    stages: _Stages,
+    said: Sequence[Finding],
+) -> CloneReport:
+    source, target = transfer.source, transfer.target
+    about_source = tuple(f for f in source.findings if not f.code.startswith("no-"))
+    return CloneReport(
+        backend,
+        as_published,
+        source.scene.name,
+        target.scene.name,
+        count,
+        {**transfer.skin.measures, **transfer.tally.measures()},
+        dict(transfer.skin.parameters),
+        (*about_source, *target.findings, *transfer.findings, *said),
+        dict(stages.timings),
+    )

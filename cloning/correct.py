@@ -1,0 +1,101 @@
+"""Make every feature point move exactly as its FAPU says, by small local additions to the cloned motion.
+
+Each feature point has a bump over the skin around it (distance measured along the surface, so that a bump never
+jumps from lip to lip). For each motion the heights of all bumps are solved together. Where a motion leaves the
+skin at rest the bumps are zero too, so static skin stays static.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cloning.surface import Surface
+from fba.arrays import Floats
+
+WIDTH = 0.16
+"""Largest width (sigma) of a bump, in eye separations."""
+
+REACH = 2.8
+"""A bump ends at this many widths."""
+
+NARROWEST = 0.03
+"""Smallest width of a bump, in eye separations."""
+
+ACTIVE = 0.04
+"""Skin that moves more than this share of a motion's largest offset takes the full correction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """Bumps of a target.
+
+    Attributes
+    ----------
+    ids : the feature points.
+    bumps : (n, k) sparse.
+    evaluate : (k, n) sparse, a field at the feature points.
+    """
+
+    ids: tuple[str, ...]
+    bumps: Any
+    evaluate: Any
+
+    def apply(self, motion: Floats, goals: Floats) -> tuple[Floats, Floats]:
+        """Add the bumps to a motion, in place.
+
+        Parameters
+        ----------
+        motion : (n, K, 3) cloned offsets of K motions.
+        goals : (k, K, 3) wanted offsets of the feature points.
+
+        Returns
+        -------
+        before, after : (k, K, 3) what the feature points miss.
+        """
+        k, count = len(self.ids), motion.shape[1]
+        flat = motion.reshape(len(motion), -1)
+        before = goals - (self.evaluate @ flat).reshape(k, count, 3)
+        size = np.linalg.norm(motion, axis=2)
+        active = _smooth_step(size / np.maximum(ACTIVE * size.max(axis=0), 1e-300))
+        support = np.unique(self.evaluate.indices)
+        at_points = self.evaluate[:, support].toarray()
+        at_support = self.bumps[support].toarray()
+        heights = np.zeros((k, count, 3))
+        for m in range(count):
+            system = at_points @ (active[support, m, None] * at_support)
+            normal = system.T @ system
+            normal[np.diag_indices(k)] += 1e-8 * max(float(np.trace(normal)) / k, 1e-30)
+            heights[:, m] = np.linalg.solve(normal, system.T @ before[:, m])
+        added = (self.bumps @ heights.reshape(k, -1)).reshape(motion.shape)
+        motion += added * active[:, :, None]
+        after = goals - (self.evaluate @ motion.reshape(len(motion), -1)).reshape(k, count, 3)
+        return before, after
+
+
+def _smooth_step(t: Floats) -> Floats:
+    t = np.clip(t, 0.0, 1.0)
+    smooth: Floats = t * t * (3.0 - 2.0 * t)
+    return smooth
+
+
+def correction(surface: Surface, ids: Sequence[str]) -> Correction:
+    """Build the bumps of these feature points of a target skin."""
+    from scipy.sparse import csr_array
+
+    ids = tuple(ids)
+    distances = surface.distances(ids, REACH * WIDTH)
+    evaluate = surface.point_matrix(ids)
+    between = np.array([(evaluate @ row.clip(max=1.0)) for row in distances]).reshape(len(ids), -1)
+    np.fill_diagonal(between, np.inf)
+    gap = between.min(axis=1) if len(ids) > 1 else np.full(len(ids), np.inf)
+    widths = np.clip(gap, NARROWEST, WIDTH)
+    scaled = distances / (REACH * widths[:, None])
+    rows, columns = np.nonzero(scaled < 1.0)
+    t = scaled[rows, columns]
+    values = np.exp(-0.5 * (REACH * t) ** 2) * (1.0 - t * t) ** 2
+    bumps = csr_array((values, (columns, rows)), shape=(surface.vertex_count, len(ids)))
+    return Correction(ids, bumps, evaluate)

@@ -1,0 +1,165 @@
+"""Which side of the mouth and of the eyes a vertex belongs to, measured along the surface.
+
+Upper and lower lip nearly touch in space but are far apart along the skin, so a label by geodesic distance tells
+them apart also where they curl over the contact line and inside the mouth. Motion is never sampled, filtered or
+warped across two opposite labels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cloning.surface import Surface, symmetric_graph
+from fba.arrays import Bools, Floats, Ints
+
+NONE = 0
+SIDES: tuple[tuple[int, tuple[str, ...]], ...] = (
+    (1, ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6", "8.9", "8.10")),
+    (2, ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")),
+    (3, ("3.1", "3.13")),
+    (4, ("3.3", "3.9")),
+    (5, ("3.2", "3.14")),
+    (6, ("3.4", "3.10")),
+)
+"""Label number and its feature points; 1/2 upper/lower lip, 3/4 left lids, 5/6 right lids."""
+
+OPPOSITE = np.array([-1, 2, 1, 4, 3, 6, 5])
+"""The label that a label must never mix with; -1 for none."""
+
+REACH = {1: ("8.3", "8.4", 0.75), 3: ("3.7", "3.11", 0.75), 5: ("3.8", "3.12", 0.75)}
+"""How far a pair of labels reaches: corner, corner, and the share of their distance (0.75 MW for the lips)."""
+
+SURE = 0.8
+"""A vertex is labelled where the nearer side's distance is at most this share of the other's."""
+
+SEALED = 0.35
+"""The mouth counts as sealed where the way from upper to lower lip is shorter than this share of MW."""
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """Labels of a surface.
+
+    Attributes
+    ----------
+    values : (n,) int, 0 = belongs to no lip or lid.
+    sealed : first label of each pair whose two sides are grown together (1 mouth, 3 left eye, 5 right eye).
+    seam : (n,) float64, distance along the surface from the line where a sealed mouth was cut; inf elsewhere.
+    """
+
+    values: Ints
+    sealed: tuple[int, ...]
+    seam: Floats
+
+    def of_triangles(self, triangles: Ints) -> Ints:
+        """(t, 3) labels of the triangles' corners."""
+        return self.values[triangles]
+
+
+def label(surface: Surface) -> Labels:
+    """Label the lips and lids of a skin."""
+    values = np.zeros(surface.vertex_count, dtype=np.int32)
+    seam = np.full(surface.vertex_count, np.inf)
+    sealed: list[int] = []
+    for (upper, upper_points), (lower, lower_points) in zip(SIDES[::2], SIDES[1::2], strict=True):
+        here = [i for i in upper_points if i in surface.points], [i for i in lower_points if i in surface.points]
+        left, right, share = REACH[upper]
+        if not here[0] or not here[1] or left not in surface.positions or right not in surface.positions:
+            continue
+        width = float(np.linalg.norm(surface.positions[left] - surface.positions[right]))
+        reach = share * width
+        without = None
+        above, below = (surface.distances(ids, 3.0 * width).min(axis=0) for ids in here)
+        if _grown_together(surface, here[0][0], here[1][0], width):
+            sealed.append(upper)
+            if upper != 1:
+                continue
+            without, seam = _cut(surface, width)
+            above, below = (surface.distances(ids, 3.0 * width, without).min(axis=0) for ids in here)
+        near, far = np.minimum(above, below), np.maximum(above, below)
+        sure = (near < reach) & (near <= SURE * far)
+        values[sure & (above < below)] = upper
+        values[sure & (below < above)] = lower
+    return Labels(values, tuple(sealed), seam)
+
+
+def _grown_together(surface: Surface, upper: str, lower: str, width: float) -> bool:
+    """True if skin joins the middles of the two sides directly, not round the corners."""
+    rows = surface.point_matrix([lower])
+    d = surface.distances([upper], width)[0]
+    used = rows.indices[rows.data > 1e-6]
+    return bool(np.min(d[used]) < SEALED * width)
+
+
+def _cut(surface: Surface, width: float) -> tuple[Bools, Floats]:
+    """Vertices along the shortest path 2.4 - 2.2 - 2.5, and everybody's distance from it."""
+    from scipy.sparse.csgraph import dijkstra
+
+    ids = [i for i in ("2.4", "2.2", "2.5") if i in surface.points]
+    stops = [int(surface.points[i][0][np.argmax(surface.points[i][1])]) for i in ids]
+    on_path = np.zeros(surface.vertex_count, dtype=bool)
+    edges = surface.edges
+    lengths = np.linalg.norm(surface.vertices[edges[:, 0]] - surface.vertices[edges[:, 1]], axis=1)
+    graph = symmetric_graph(edges, lengths, surface.vertex_count)
+    for start, end in zip(stops, stops[1:], strict=False):
+        _, before = dijkstra(graph, indices=start, return_predecessors=True)
+        step = end
+        while step >= 0:
+            on_path[step] = True
+            step = int(before[step])
+    away = dijkstra(surface.graph, indices=np.flatnonzero(on_path), min_only=True, limit=width)
+    return on_path, away
+
+
+def visible(surface: Surface, directions: int = 14, cells: int = 384) -> Bools:
+    """Vertices that can be seen from somewhere outside, (n,) bool.
+
+    The surface is drawn into a depth buffer from directions all around (not from below); a vertex is visible
+    where it lies at the front of one of them and faces it.
+    """
+    seen = np.zeros(surface.vertex_count, dtype=bool)
+    normals = surface.normals
+    for view in _views(directions):
+        side = np.cross([0.0, 1.0, 0.0], view)
+        side /= np.linalg.norm(side)
+        up = np.cross(view, side)
+        flat = surface.vertices @ np.stack([side, up], axis=1)
+        depth = surface.vertices @ view
+        front = _front(flat, depth, surface.triangles, cells)
+        seen |= (depth > front) & (normals @ view > 0.05)
+    return seen
+
+
+def _views(count: int) -> Floats:
+    """Directions spread evenly over the sphere above a shallow angle, symmetric to the left and right."""
+    rows = [(0.0, 0.0), (0.0, -0.35), (0.0, 0.6)]
+    for angle in (0.5, 1.0, 1.6, 2.4):
+        rows += [(s * angle, e) for s in (1.0, -1.0) for e in (0.1, -0.3)]
+    rows += [(np.pi, 0.2), (0.0, 1.3)]
+    turned = np.array(rows[: max(count, 1)])
+    a, e = turned[:, 0], turned[:, 1]
+    found: Floats = np.stack([np.sin(a) * np.cos(e), np.sin(e), np.cos(a) * np.cos(e)], axis=1)
+    return found
+
+
+def _front(flat: Floats, depth: Floats, triangles: Ints, cells: int) -> Floats:
+    """Depth just behind the foremost surface at each vertex: a depth buffer of sample points of the triangles."""
+    low = flat.min(axis=0)
+    size = float((flat.max(axis=0) - low).max()) / cells
+    buffer = np.full((cells + 2, cells + 2), -np.inf)
+    corners = flat[triangles]
+    spread = np.linalg.norm(corners.max(axis=1) - corners.min(axis=1), axis=1)
+    steps = np.clip(np.ceil(spread / size).astype(int), 1, 24)
+    for n in np.unique(steps):
+        some = triangles[steps == n]
+        grid = [(i / n, j / n, 1.0 - (i + j) / n) for i in range(n + 1) for j in range(n + 1 - i)]
+        weights = np.array(grid)
+        places = np.einsum("gk,tkc->tgc", weights, flat[some]).reshape(-1, 2)
+        heights = np.einsum("gk,tk->tg", weights, depth[some]).ravel()
+        cell = ((places - low) / size).astype(int)
+        np.maximum.at(buffer, (cell[:, 0], cell[:, 1]), heights)
+    cell = ((flat - low) / size).astype(int)
+    found: Floats = buffer[cell[:, 0], cell[:, 1]] - 3.0 * size
+    return found

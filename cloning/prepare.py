@@ -1,0 +1,149 @@
+"""Make a face ready for cloning: axes, parts, feature points, FAPUs, skin and labels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cloning.labels import Labels, label
+from cloning.parts import INSIDE, split_parts
+from cloning.surface import Surface, build_surface
+from fba.arrays import Floats
+from fba.errors import LandmarkError
+from fba.fapu import FAPU_POINTS, Fapu
+from fba.feature_points import FeaturePoint, FeaturePoints, feature_point_definitions
+from fba.findings import Finding
+from fba.orientation import orient
+from fba.scene import FaceScene, Role
+
+NECESSARY = (*FAPU_POINTS, "9.3", "2.1", "2.3", "2.4", "2.5", "3.7", "3.8", "3.11", "3.12")
+"""Without these no face can be cloned: the FAPUs, and the outline of mouth and eyes."""
+
+DERIVED = ("3.5", "3.6", "7.1", "7.2")
+"""These are worked out from other points where they are missing."""
+
+OPTIONAL = ("7.1", "7.2", "11.4", "11.5", "11.6", "8.9", "8.10", *(f"9.{k}" for k in (4, 5, 6, 7, 12, 13, 14)))
+"""Not among the points that Facial Motion Cloning asks for; they refine the alignment where they are given."""
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedFace:
+    """One side of a clone.
+
+    Attributes
+    ----------
+    scene : inside axes, every shape with its role.
+    skin : all skin shapes as one surface, in eye separations.
+    """
+
+    scene: FaceScene
+    points: FeaturePoints
+    fapu: Fapu
+    skin: Surface
+    labels: Labels
+    findings: tuple[Finding, ...]
+
+    def place(self, key: str) -> Floats:
+        """World position of a feature point, mesh units."""
+        return self.skin.positions[key] * self.fapu.es0
+
+
+def prepare(scene: FaceScene, points: FeaturePoints, who: str) -> PreparedFace:
+    """Orient, split, measure and label a face.
+
+    Parameters
+    ----------
+    who : "source" or "target", for messages.
+
+    Raises
+    ------
+    LandmarkError
+        If necessary feature points are missing or contradict each other.
+    """
+    points, findings = complete_points(scene, points, who)
+    scene, points, turned = orient(scene, points)
+    scene, points, missing = split_parts(scene, points)
+    positions = points.positions(scene)
+    fapu = Fapu.from_feature_points(positions)
+    points, derived = _pivots(scene, points, fapu, who)
+    shapes = [s.name for s in scene.with_role(Role.SKIN)]
+    skin = build_surface(scene, points, shapes, fapu.es0)
+    if len([i for i in skin.points if i not in INSIDE]) < len(NECESSARY) - len(DERIVED):
+        raise LandmarkError(
+            f"the {who} '{scene.name}': only {len(skin.points)} feature points lie on the skin; "
+            "give them as a face and barycentric coordinates, or as a vertex"
+        )
+    labels = label(skin)
+    found = (*findings, *turned, *missing, *derived, *_sealed(labels, scene.name))
+    return PreparedFace(scene, points, fapu, skin, labels, found)
+
+
+def complete_points(scene: FaceScene, points: FeaturePoints, who: str) -> tuple[FeaturePoints, list[Finding]]:
+    """Add what can be worked out, and say what is missing.
+
+    Raises
+    ------
+    LandmarkError
+        If one of NECESSARY is missing and cannot be derived.
+    """
+    findings: list[Finding] = []
+    added: dict[str, FeaturePoint] = {}
+    place = points.positions(scene)
+    for pupil, ids in (("3.5", ("3.1", "3.3", "3.7", "3.11")), ("3.6", ("3.2", "3.4", "3.8", "3.12"))):
+        if pupil not in points and all(i in points for i in ids):
+            middle = np.mean([place[i] for i in ids], axis=0)
+            added[pupil] = FeaturePoint.free(middle, source="derived", confidence=0.5)
+            findings.append(
+                Finding("warning", "derived-point", f"{who}: {pupil} (pupil) is not given; the middle of the "
+                        "eye opening is used, and the FAPUs depend on it", pupil)
+            )
+    points = points.with_points(added)
+    points.require(*NECESSARY, purpose=f"cloning onto the target '{scene.name}'" if who == "target" else
+                   f"cloning from the source '{scene.name}'")
+    known = feature_point_definitions()
+    wanted = [i for i in known if i not in OPTIONAL and i not in INSIDE and not i.startswith("10.")]
+    absent = [i for i in wanted if i not in points]
+    if absent:
+        findings.append(
+            Finding("warning", "missing-points", f"{who}: feature points {', '.join(absent)} are not given; the faces "
+                    "are aligned without them, less exactly around there", scene.name)
+        )
+    return points, findings
+
+
+def _pivots(
+    scene: FaceScene, points: FeaturePoints, fapu: Fapu, who: str
+) -> tuple[FeaturePoints, list[Finding]]:
+    """Derive 7.1 (top of the spine) and 7.2 (base of the neck) where they are missing."""
+    place = points.positions(scene)
+    added: dict[str, FeaturePoint] = {}
+    findings: list[Finding] = []
+    if "7.1" not in points:
+        if "10.7" in place and "10.8" in place:
+            top = 0.5 * (place["10.7"] + place["10.8"])
+            how = "midway between the ear lobes' contact points 10.7 and 10.8"
+        else:
+            eyes = 0.5 * (place["3.5"] + place["3.6"])
+            top = eyes + np.array([0.0, -1.0, -1.35]) * fapu.es0
+            how = "behind and below the eyes, at the proportions of an average head"
+        added["7.1"] = FeaturePoint.free(top, source="derived", confidence=0.5)
+        findings.append(Finding("info", "derived-point", f"{who}: 7.1 (head pivot) is not given; placed {how}", "7.1"))
+        place["7.1"] = top
+    if "7.2" not in points:
+        added["7.2"] = FeaturePoint.free(
+            place["7.1"] + np.array([0.0, -1.5, -0.2]) * fapu.es0, source="derived", confidence=0.3
+        )
+    return points.with_points(added), findings
+
+
+def _sealed(labels: Labels, where: str) -> list[Finding]:
+    said = {
+        1: ("sealed-mouth", "the lips are grown together, so the mouth cannot open: the skin between them stretches "
+            "smoothly instead. Cut the mesh along the lip line to let it open"),
+        3: ("sealed-left-eye", "the left eye's lids are grown together or closed over the eye; a blink moves the skin "
+            "but shows no eyeball"),
+        5: ("sealed-right-eye", "the right eye's lids are grown together or closed over the eye; a blink moves the "
+            "skin but shows no eyeball"),
+    }
+    return [Finding("warning", *said[k], where) for k in labels.sealed]

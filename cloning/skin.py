@@ -1,0 +1,169 @@
+"""The map from a source's skin to a target's: one sparse operator for every motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cloning.align import align
+from cloning.antialias import edge_samples
+from cloning.fill import HarmonicFill
+from cloning.labels import Labels
+from cloning.locate import Places, closest
+from cloning.refine import Refinement, refine
+from cloning.surface import Surface, polygon_edges
+from fba.arrays import Bools, Floats, Ints
+
+FARTHEST = 0.10
+"""A vertex has no partner farther from the source's skin than this, in eye separations, after alignment."""
+
+LEAST_FACING = 0.25
+"""A vertex has no partner where the skins' normals differ by more than about 75 degrees."""
+
+SEAM_BAND = 0.12
+"""Half width of the band (in MW) over which a sealed mouth's skin stretches from the upper to the lower lip."""
+
+COARSER = 1.5
+"""A source is refined where its edges are longer than the target's by this factor."""
+
+MOST_VERTICES = 120_000
+
+
+@dataclass(frozen=True, eq=False)
+class SkinMap:
+    """Carries offsets from the source's skin to the target's.
+
+    Attributes
+    ----------
+    refinements : smooth upsampling of the source, applied first.
+    matrix : (n_t, n) sparse, rows add up to 1; zero rows for vertices without a partner.
+    scale : (n_t, 3) FAPU ratios target/source for each vertex and axis, mesh units.
+    fill : fills the vertices without a partner.
+    unmatched : (n_t,) bool.
+    distances : (n_t,) how far each vertex is from the source's skin after alignment.
+    """
+
+    refinements: tuple[Refinement, ...]
+    matrix: Any
+    scale: Floats
+    fill: HarmonicFill
+    unmatched: Bools
+    distances: Floats
+
+    def apply(self, motions: Floats) -> Floats:
+        """Carry K motions at once: (n_s, K, 3) source offsets to (n_t, K, 3) target offsets, mesh units."""
+        count = motions.shape[1]
+        flat = np.ascontiguousarray(motions.reshape(len(motions), -1))
+        for step in self.refinements:
+            flat = step.apply(flat)
+        carried: Floats = self.matrix @ flat
+        carried.reshape(-1, count, 3)[...] *= self.scale[:, None, :]
+        self.fill.apply(carried)
+        return carried.reshape(-1, count, 3)
+
+
+def build_skin_map(
+    source: Surface, source_labels: Labels, target: Surface, target_labels: Labels, scale: Floats
+) -> SkinMap:
+    """Find every target vertex's place on the source's skin.
+
+    Parameters
+    ----------
+    scale : (n_t, 3) FAPU ratios in mesh units.
+    """
+    refinements, fine, fine_labels = _refined(source, source_labels.values, target)
+    moved = align(source, target, target_labels.values)
+    normals = target.normals_of(moved)
+    labels = target_labels.values
+    places = _find(moved, normals, labels, fine, fine_labels)
+    spacing = _spacing(fine)[np.maximum(places.triangles, 0)]
+    extra = edge_samples(moved, normals, target.edges, labels, spacing)
+    more = _find(extra.points, extra.normals, labels[extra.owners], fine, fine_labels)
+    unmatched = (places.distances > FARTHEST) | (places.facing < LEAST_FACING)
+    if 1 in target_labels.sealed:
+        width = float(np.linalg.norm(target.positions["8.3"] - target.positions["8.4"]))
+        unmatched = unmatched | (target_labels.seam < SEAM_BAND * width)
+    matrix = _matrix(places, more, extra.owners, unmatched, fine)
+    if len(target.links):
+        matrix = (target.seam_mean @ matrix).tocsr()
+        unmatched = (target.seam_mean @ unmatched.astype(float)) > 0.0
+    edges = np.concatenate([target.edges, target.links])
+    fill = HarmonicFill(target.vertices, edges, unmatched)
+    return SkinMap(refinements, matrix, scale, fill, unmatched, places.distances)
+
+
+def _find(points: Floats, normals: Floats, labels: Ints, fine: Surface, fine_labels: Ints) -> Places:
+    return closest(points, normals, labels, fine.vertices, fine.normals, fine.triangles, fine_labels)
+
+
+def _matrix(places: Places, more: Places, owners: Ints, unmatched: Bools, fine: Surface) -> Any:
+    from scipy.sparse import csr_array, diags_array
+
+    good = (more.triangles >= 0) & (more.distances <= FARTHEST) & (more.facing >= LEAST_FACING)
+    rows = np.concatenate([np.arange(len(places.triangles)), owners[good]])
+    triangles = np.concatenate([places.triangles, more.triangles[good]])
+    weights = np.concatenate([places.weights, more.weights[good]])
+    kept = ~unmatched[rows] & (triangles >= 0)
+    rows, triangles, weights = rows[kept], triangles[kept], weights[kept]
+    columns = fine.triangles[triangles]
+    shape = (len(places.triangles), fine.vertex_count)
+    entries = weights.ravel()
+    used = entries > 1e-12
+    summed = csr_array((entries[used], (np.repeat(rows, 3)[used], columns.ravel()[used])), shape=shape)
+    count = np.maximum(np.bincount(rows, minlength=shape[0]), 1)
+    return (diags_array(1.0 / count) @ summed).tocsr()
+
+
+def _spacing(surface: Surface) -> Floats:
+    """(t,) mean edge length of each triangle."""
+    corners = surface.vertices[surface.triangles]
+    sides: Floats = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)
+    return sides
+
+
+def _refined(source: Surface, labels: Ints, target: Surface) -> tuple[tuple[Refinement, ...], Surface, Ints]:
+    """Subdivide the source until its edges in the face are about as short as the target's."""
+    steps: list[Refinement] = []
+    while _face_spacing(source) > COARSER * _face_spacing(target) and source.vertex_count * 4 <= MOST_VERTICES:
+        step = refine(*source.polygons, source.vertex_count)
+        labels = _inherit(step, labels)
+        corners = step.polygons[0].reshape(-1, 4)
+        source = replace(
+            source,
+            shapes=(),
+            starts=np.zeros(1, np.int32),
+            vertices=step.matrix @ source.vertices,
+            polygons=step.polygons,
+            triangles=np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]),
+            links=np.zeros((0, 2), np.int32),
+            points={},
+        )
+        steps.append(step)
+        if len(steps) == 2:
+            break
+    return tuple(steps), source, labels
+
+
+def _inherit(step: Refinement, labels: Ints) -> Ints:
+    """A new vertex has the label that all of its parents share; else none."""
+    parents = step.parents.tocsr()
+    first = labels[parents.indices[parents.indptr[:-1]]]
+    differs = labels[parents.indices] != np.repeat(first, np.diff(parents.indptr))
+    mixed = np.add.reduceat(differs.astype(int), parents.indptr[:-1]) > 0
+    found: Ints = np.where(mixed, 0, first)
+    return found
+
+
+def _face_spacing(surface: Surface) -> float:
+    """Median edge length within 1.2 eye separations of the nose tip (of the whole skin where there is none)."""
+    edges = surface.edges if surface.shapes else polygon_edges(*surface.polygons)
+    middle = 0.5 * (surface.vertices[edges[:, 0]] + surface.vertices[edges[:, 1]])
+    length = np.linalg.norm(surface.vertices[edges[:, 0]] - surface.vertices[edges[:, 1]], axis=1)
+    tip = surface.positions.get("9.3")
+    if tip is not None:
+        near = np.linalg.norm(middle - tip, axis=1) < 1.2
+        if near.any():
+            length = length[near]
+    return float(np.median(length))

@@ -1,0 +1,197 @@
+"""Carry motions of a whole face: skin, lower teeth, tongue, eyeballs, and what rides on the skin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cloning.align import anchor_ids
+from cloning.backends import SkinTransfer
+from cloning.bind import Binding
+from cloning.bodies import Body, Mover, body, eye_mover, teeth_mover, tongue_mover
+from cloning.correct import Correction, correction
+from cloning.normalize import ratios
+from cloning.prepare import PreparedFace
+from fba.arrays import Floats
+from fba.findings import Finding
+from fba.scene import Role
+
+CHUNK = 24
+"""Motions carried in one go; keeps the memory of a fine source below a few hundred MB."""
+
+INNER_LIPS = ("2.2", "2.3", "2.6", "2.7", "2.8", "2.9")
+
+Offsets = Mapping[str, Floats]
+
+
+@dataclass
+class Tally:
+    """Sums of what feature points miss, over all motions."""
+
+    before: float = 0.0
+    after: float = 0.0
+    wanted: float = 0.0
+    worst: float = 0.0
+
+    def measures(self) -> dict[str, float]:
+        total = max(self.wanted, 1e-300)
+        return {
+            "fp_error_before": self.before / total,
+            "fp_error_after": self.after / total,
+            "fp_error_worst_es": self.worst,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class FaceTransfer:
+    """Everything that is needed to carry any motion from one face to another.
+
+    Attributes
+    ----------
+    source, target : the prepared faces.
+    skin : the backend's transfer.
+    correction : bumps that make the feature points exact; None in published mode.
+    ids : the feature points that are measured (and corrected).
+    bodies : (source's body, target's body, mover) of each part that both faces have.
+    bindings : shape name -> how it rides on the skin.
+    """
+
+    source: PreparedFace
+    target: PreparedFace
+    skin: SkinTransfer
+    correction: Correction | None
+    ids: tuple[str, ...]
+    bodies: Sequence[tuple[Body, Body, Callable[[dict[str, Floats]], Mover]]]
+    bindings: Mapping[str, Binding]
+    findings: tuple[Finding, ...] = ()
+    tally: Tally = field(default_factory=Tally)
+
+    def apply(
+        self, motions: Sequence[Offsets], tick: Callable[[float], None] | None = None
+    ) -> list[dict[str, Floats]]:
+        """Carry motions: each a mapping shape -> (n, 3) world offsets, mesh units.
+
+        Returns
+        -------
+        The same for the target; shapes that rest are absent.
+        """
+        out: list[dict[str, Floats]] = []
+        for start in range(0, len(motions), CHUNK):
+            out += self._chunk(motions[start : start + CHUNK])
+            if tick is not None:
+                tick(min(start + CHUNK, len(motions)) / len(motions))
+        return out
+
+    def _chunk(self, motions: Sequence[Offsets]) -> list[dict[str, Floats]]:
+        moving = np.stack([self.source.skin.join(m) for m in motions], axis=1)
+        skin = self.skin.apply(moving)
+        self._correct(moving, skin)
+        done: dict[str, Floats] = dict(self.target.skin.split(skin))
+        for mine, yours, mover in self.bodies:
+            offsets = mine.join(motions)
+            if np.any(offsets):
+                done.update(yours.split(mover(done)(offsets)))
+        for name, binding in self.bindings.items():
+            done[name] = binding.apply(skin)
+        out: list[dict[str, Floats]] = []
+        for k in range(len(motions)):
+            out.append({n: np.ascontiguousarray(v[:, k]) for n, v in done.items() if np.any(v[:, k])})
+        return out
+
+    def _correct(self, moving: Floats, skin: Floats) -> None:
+        """Measure the feature points and, if wanted, make them exact (in place)."""
+        if not self.ids:
+            return
+        count = moving.shape[1]
+        rows = self.source.skin.point_matrix(self.ids)
+        wanted = (rows @ moving.reshape(len(moving), -1)).reshape(len(self.ids), count, 3)
+        wanted = wanted * ratios(self.source.fapu, self.target.fapu, self.ids)[:, None]
+        if self.correction is not None:
+            before, after = self.correction.apply(skin, wanted)
+        else:
+            here = self.target.skin.point_matrix(self.ids) @ skin.reshape(len(skin), -1)
+            before = after = wanted - here.reshape(wanted.shape)
+        self.tally.before += float(np.abs(before).sum())
+        self.tally.after += float(np.abs(after).sum())
+        self.tally.wanted += float(np.abs(wanted).sum())
+        self.tally.worst = max(self.tally.worst, float(np.abs(after).max(initial=0.0)) / self.target.fapu.es0)
+
+
+def build_face_transfer(
+    source: PreparedFace, target: PreparedFace, skin: SkinTransfer, as_published: bool
+) -> FaceTransfer:
+    """Pair up the parts of two faces.
+
+    Parameters
+    ----------
+    as_published : teeth and tongue only translate, nothing rides on the skin, feature points are not corrected.
+    """
+    ids = tuple(anchor_ids(source.skin, target.skin))
+    if 1 in target.labels.sealed:
+        ids = tuple(i for i in ids if i not in INNER_LIPS)
+    bodies, findings = _pair(source, target, as_published)
+    bindings: dict[str, Binding] = {}
+    if not as_published:
+        for shape in target.scene.with_role(Role.OTHER):
+            if shape.mesh.vertex_count and shape.mesh.face_count:
+                vertices = target.scene.world_vertices(shape.name) / target.fapu.es0
+                bindings[shape.name] = Binding(vertices, shape.mesh.indices, shape.mesh.offsets, target.skin)
+    return FaceTransfer(
+        source,
+        target,
+        skin,
+        None if as_published else correction(target.skin, ids),
+        ids,
+        bodies,
+        bindings,
+        tuple(findings),
+    )
+
+
+def _pair(
+    source: PreparedFace, target: PreparedFace, as_published: bool
+) -> tuple[list[tuple[Body, Body, Callable[[dict[str, Floats]], Mover]]], list[Finding]]:
+    pairs: list[tuple[Body, Body, Callable[[dict[str, Floats]], Mover]]] = []
+    findings: list[Finding] = []
+    for role in (Role.LOWER_TEETH, Role.TONGUE, Role.EYE_LEFT, Role.EYE_RIGHT):
+        mine, yours = body(source, role), body(target, role)
+        if yours is None:
+            continue
+        if mine is None:
+            words = role.value.replace("_", " ")
+            findings.append(
+                Finding("warning", f"source-no-{role.value.replace('_', '-')}",
+                        f"the source has no {words}, so the target's {words} get no motion of their own", target.scene.name)
+            )
+            continue
+        pairs.append((mine, yours, _mover(source, target, mine, yours, role, as_published)))
+    return pairs, findings
+
+
+def _mover(
+    source: PreparedFace, target: PreparedFace, mine: Body, yours: Body, role: Role, as_published: bool
+) -> Callable[[dict[str, Floats]], Mover]:
+    if role is Role.LOWER_TEETH or (role is Role.TONGUE and as_published):
+        fixed = teeth_mover(source, target, mine, yours, turning=not as_published)
+        return lambda _: fixed
+    if role is not Role.TONGUE:
+        ball = eye_mover(source, target, mine, yours, role)
+        return lambda _: ball
+    lower = body(target, Role.LOWER_TEETH)
+    found: dict[str, Floats] = {}
+
+    def jaw() -> Floats | None:
+        if lower is None or any(name not in found for name in lower.names):
+            return None
+        return np.concatenate([found[name] for name in lower.names])
+
+    tongue = tongue_mover(source, target, mine, yours, jaw)
+
+    def with_teeth(done: dict[str, Floats]) -> Mover:
+        found.clear()
+        found.update(done)
+        return tongue
+
+    return with_teeth
