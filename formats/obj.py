@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from bisect import bisect_right
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -321,10 +322,12 @@ def _split(
     owner[mesh.indices] = corner_object
     if not np.array_equal(owner[mesh.indices], corner_object):
         return (Shape("face", mesh, materials=materials),)
-    # A vertex that no polygon uses goes with the object of the polygons that follow it in the file.
-    lone = owner < 0
-    following = np.minimum(np.searchsorted(polygons.lines, vertex_lines[lone]), len(of_face) - 1)
-    owner[lone] = of_face[following]
+    # A vertex that no polygon uses goes with the object it was written in, or with the polygons that follow it.
+    for vertex in np.flatnonzero(owner < 0).tolist():
+        line = vertex_lines[vertex]
+        declared = objects.names[bisect_right(objects.lines, line) - 1] if line > objects.lines[0] else ""
+        following = min(int(np.searchsorted(polygons.lines, line)), len(of_face) - 1)
+        owner[vertex] = names.index(declared) if declared in names else of_face[following]
     shapes = []
     for number, label in enumerate(unique_names(names)):
         part, ids = mesh.submesh(owner == number)

@@ -48,7 +48,8 @@ def write_obj(
     vertices = (
         mesh.vertices if colors is None or len(colors) != mesh.vertex_count else np.hstack([mesh.vertices, colors])
     )
-    lines += _rows("v", vertices)
+    objects = objects and (len(gathered.shape_names) > 1 or gathered.shape_names[0] != "face")
+    lines += _vertices(vertices, scene, objects)
     if mesh.texcoords is not None:
         lines += _rows("vt", mesh.texcoords)
     if mesh.normals is not None:
@@ -57,6 +58,23 @@ def write_obj(
     if gathered.materials:
         write_bytes(library, format_mtl(gathered.materials).encode())
     write_bytes(path, ("\n".join(lines) + "\n").encode())
+
+
+def _vertices(vertices: Floats, scene: FaceScene, objects: bool) -> list[str]:
+    """The vertex lines, each run of one shape's vertices under that shape's name."""
+    rows = _rows("v", vertices)
+    if not objects:
+        return rows
+    names = {}
+    owner = np.zeros(len(vertices), dtype=np.int32)
+    for number, (name, ids) in enumerate(scene.file_order().items()):
+        owner[ids] = number
+        names[number] = name
+    starts = np.flatnonzero(np.diff(owner, prepend=-1)).tolist()
+    lines = []
+    for start, end in zip(starts, [*starts[1:], len(rows)], strict=True):
+        lines += [f"o {names[int(owner[start])]}", *rows[start:end]]
+    return lines
 
 
 def _rows(keyword: str, values: Floats) -> list[str]:
@@ -69,7 +87,7 @@ def _faces(gathered: GatheredMesh, objects: bool) -> list[str]:
     corners = _corners(gathered)
     offsets = mesh.offsets.tolist()
     state: list[tuple[str, list[int], tuple[str, ...]]] = []
-    if objects and (len(gathered.shape_names) > 1 or gathered.shape_names[0] != "face"):
+    if objects:
         state.append(("o", gathered.shape_of_face.tolist(), gathered.shape_names))
     if mesh.face_groups is not None:
         state.append(("g", mesh.face_groups.tolist(), mesh.group_names))
