@@ -34,10 +34,12 @@ BY_NAME: tuple[tuple[str, tuple[float, float, float]], ...] = (
 CLEAR = re.compile("cornea|occlusion|lacrimal|tear|eyeblend|eye_blend|lens", re.IGNORECASE)
 """Clear films over the eye, which would hide it if they were painted."""
 
+LASH_OPACITY = 0.25
+
 GLOSS = {
     Role.SKIN: 0.055,
-    Role.EYE_LEFT: 0.35,
-    Role.EYE_RIGHT: 0.35,
+    Role.EYE_LEFT: 0.10,
+    Role.EYE_RIGHT: 0.10,
     Role.UPPER_TEETH: 0.22,
     Role.LOWER_TEETH: 0.22,
     Role.TONGUE: 0.16,
@@ -84,11 +86,17 @@ def natural_color(role: Role, name: str) -> tuple[float, float, float]:
     return NATURAL[role]
 
 
+def opacity(shape: Shape) -> float:
+    """How solid a shape is drawn: lashes are strips that stand for separate hairs."""
+    solid = 1.0 - max((m.transparency for m in shape.materials), default=0.0)
+    return min(solid, LASH_OPACITY) if re.search("lash", shape.name, re.IGNORECASE) else solid
+
+
 def is_clear(shape: Shape) -> bool:
     """True for films over the eye and for see-through shapes, which are not drawn."""
     if CLEAR.search(shape.name):
         return True
-    return bool(shape.materials) and all(m.transparency > 0.5 or CLEAR.search(m.name) for m in shape.materials)
+    return bool(shape.materials) and all(m.transparency > 0.85 or CLEAR.search(m.name) for m in shape.materials)
 
 
 def clear_faces(shape: Shape) -> Floats | None:
@@ -96,7 +104,7 @@ def clear_faces(shape: Shape) -> Floats | None:
     ids = shape.mesh.face_materials
     if ids is None or not shape.materials:
         return None
-    clear = np.array([m.transparency > 0.5 or bool(CLEAR.search(m.name)) for m in shape.materials] + [False])
+    clear = np.array([m.transparency > 0.85 or bool(CLEAR.search(m.name)) for m in shape.materials] + [False])
     hidden = clear[np.where(ids >= 0, ids, len(shape.materials))]
     return hidden.astype(np.float64) if hidden.any() else None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fba.arrays import Floats, Floats32, Ints, frozen
 from fba.errors import MeshError
@@ -31,6 +32,25 @@ class Iris:
 
 
 @dataclass(frozen=True, eq=False)
+class Decal:
+    """A picture that tints a surface: its colours multiply the surface's own.
+
+    Attributes
+    ----------
+    image : (h, w, 3) uint8, first row on top.
+    uv : (t, 3, 2) place of each triangle's corners in it, (0, 0) the upper left and (1, 1) the lower right
+        corner; outside, the surface is left as it is.
+    """
+
+    image: NDArray[np.uint8]
+    uv: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "image", frozen(self.image, np.uint8))
+        object.__setattr__(self, "uv", frozen(self.uv, np.float64, (-1, 3, 2)))
+
+
+@dataclass(frozen=True, eq=False)
 class Drawable:
     """One thing to draw.
 
@@ -42,7 +62,8 @@ class Drawable:
         it is taken for vertices.
     normals : (n, 3) unit normals for smooth shading; None shades every triangle flat.
     gloss : strength of the highlight, 0..1, or (n,) one for each vertex.
-    iris : see `Iris`.
+    opacity : 0..1, drawn in quarters: so many of each pixel's four samples are set.
+    iris, decal : see `Iris`, `Decal`.
     """
 
     vertices: Floats
@@ -50,7 +71,9 @@ class Drawable:
     color: Floats
     normals: Floats | None = None
     gloss: float | Floats = 0.1
+    opacity: float = 1.0
     iris: Iris | None = None
+    decal: Decal | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__

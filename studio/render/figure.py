@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,15 +13,16 @@ from fba.arrays import Floats, Ints
 from fba.feature_points import FeaturePoints
 from fba.scene import FaceScene, Role, Shape
 from studio.render.camera import Camera, frame_face
-from studio.render.colors import GLOSS, clear_faces, eye_iris, is_clear, shape_colors
-from studio.render.drawable import Drawable, Iris, same_place, smooth_normals
+from studio.render.colors import EYES, GLOSS, clear_faces, eye_iris, is_clear, opacity, shape_colors
+from studio.render.drawable import Decal, Drawable, Iris, same_place, smooth_normals
+from studio.render.features import feature_decal
 from studio.render.occlusion import ambient_occlusion
 from studio.render.protocol import Renderer, make_renderer
 from studio.render.shading import UInt8
 
 SHADE_TINT = np.array([1.0, 1.30, 1.35])
 """Exponents of the open sky for red, green, blue: light in the folds of skin turns red."""
-SHADE_FLOOR = {Role.UPPER_TEETH: 0.72, Role.LOWER_TEETH: 0.72, Role.TONGUE: 0.5}
+SHADE_FLOOR = {Role.UPPER_TEETH: 0.72, Role.LOWER_TEETH: 0.72, Role.TONGUE: 0.4}
 """Least light of parts that are hidden in the neutral face, but seen when the mouth opens."""
 
 
@@ -32,11 +34,13 @@ class Style:
     ----------
     smooth : shade smoothly over edges; False shows every polygon flat.
     occlusion : darken folds and hollows (measured on the neutral face).
+    features : paint brows and lips where the feature points are, on skin of one colour.
     natural : ignore the file's materials and take natural colours.
     """
 
     smooth: bool = True
     occlusion: bool = True
+    features: bool = True
     natural: bool = False
 
 
@@ -46,7 +50,9 @@ class _Part:
     triangles: Ints
     color: Floats
     places: Ints
-    iris: Iris | None
+    opacity: float = 1.0
+    iris: Iris | None = None
+    decal: Decal | None = None
 
 
 class Figure:
@@ -70,6 +76,8 @@ class Figure:
         self.camera = frame_face(scene, points)
         self.neutral = {s.name: scene.world_vertices(s.name) for s in scene.shapes}
         self._parts = [part for s in scene.shapes if (part := _part(scene, s, self.style)) is not None]
+        if self.style.features and points is not None:
+            self._parts = self._painted(points)
         if self.style.occlusion and self._parts:
             self._parts = self._shaded()
 
@@ -85,7 +93,10 @@ class Figure:
             name = part.shape.name
             vertices = self.neutral[name] if world_shapes is None else world_shapes.get(name, self.neutral[name])
             normals = smooth_normals(vertices, part.triangles, part.places) if self.style.smooth else None
-            out.append(Drawable(vertices, part.triangles, part.color, normals, GLOSS[part.shape.role], part.iris))
+            gloss = GLOSS[part.shape.role]
+            out.append(
+                Drawable(vertices, part.triangles, part.color, normals, gloss, part.opacity, part.iris, part.decal)
+            )
         return out
 
     def draw(
@@ -98,6 +109,17 @@ class Figure:
         """Take a picture: (height, width, 3) uint8 for ``size = (width, height)``."""
         renderer = renderer or make_renderer()
         return renderer.render(self.drawables(world_shapes), camera or self.camera, *size)
+
+    def _painted(self, points: FeaturePoints) -> list[_Part]:
+        places = points.positions(self.scene)
+        brows = not any(re.search("brow", p.shape.name, re.IGNORECASE) for p in self._parts)
+        out = []
+        for part in self._parts:
+            if part.shape.role is Role.SKIN and part.color.ndim == 1:
+                decal = feature_decal(places, self.neutral[part.shape.name], part.triangles, brows)
+                part = replace(part, decal=decal)
+            out.append(part)
+        return out
 
     def _shaded(self) -> list[_Part]:
         meshes = [(self.neutral[p.shape.name], p.triangles) for p in self._parts]
@@ -120,24 +142,20 @@ def _part(scene: FaceScene, shape: Shape, style: Style) -> _Part | None:
         triangles = triangles[shown]
         color = color[shown] if color.ndim == 2 else color
     places = same_place(scene.world_vertices(shape.name))
-    return _Part(shape, triangles, color, places, eye_iris(scene, dressed, color))
+    return _Part(shape, triangles, color, places, opacity(shape), eye_iris(scene, dressed, color))
 
 
 def _darkened(part: _Part, open_sky: Floats) -> _Part:
     role = part.shape.role
-    if part.iris is not None or role in (Role.EYE_LEFT, Role.EYE_RIGHT):
+    if role in EYES:
         return part
     floor = SHADE_FLOOR.get(role, 0.08)
     light = floor + (1.0 - floor) * np.clip(open_sky, 0.0, 1.0)
     # Half the exponent: colours are stored with gamma 2.
     tint = light[:, None] ** (0.5 * SHADE_TINT)
-    vertices = len(part.shape.mesh.vertices)
-    if part.color.ndim == 1:
-        return _Part(part.shape, part.triangles, part.color * tint, part.places, part.iris)
-    if len(part.color) != vertices:
-        color = part.color * tint[part.triangles].mean(axis=1)
-        return _Part(part.shape, part.triangles, color, part.places, part.iris)
-    return _Part(part.shape, part.triangles, part.color * tint, part.places, part.iris)
+    if part.color.ndim == 1 or len(part.color) == len(tint):
+        return replace(part, color=part.color * tint)
+    return replace(part, color=part.color * tint[part.triangles].mean(axis=1))
 
 
 def face_camera(face: AnimatableFace) -> Camera:

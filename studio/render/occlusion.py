@@ -16,6 +16,7 @@ from studio.render.software import EMPTY, depth_keys
 
 DIRECTIONS = 48
 GRID = 160
+SMOOTHING = 1
 BIAS = 0.03
 """Depth, in radii of the region, below which a surface does not shade itself."""
 
@@ -47,7 +48,19 @@ def ambient_occlusion(
         total += weight
         lit += weight * _visible(vertices, triangles, direction, radius)
     open_sky = np.divide(lit, total, out=np.ones_like(lit), where=total > 0)
+    every = np.concatenate([t + start for (_, t), start in zip(meshes, counts[:-1], strict=True)])
+    open_sky = _smoothed(open_sky, every)
     return [open_sky[a:b] for a, b in pairwise(counts)]
+
+
+def _smoothed(values: Floats, triangles: Ints) -> Floats:
+    """Average each vertex with its neighbours, so that single vertices do not stand out."""
+    corners = triangles.T.ravel()
+    degree = np.bincount(corners, minlength=len(values))
+    for _ in range(SMOOTHING):
+        sums = np.bincount(corners, np.tile(values[triangles].sum(axis=1), 3), len(values))
+        values = np.where(degree > 0, sums / np.maximum(3 * degree, 1), values)
+    return values
 
 
 def _visible(vertices: Floats, triangles: Ints, direction: Floats, radius: float) -> Floats:

@@ -42,6 +42,9 @@ LIMBUS = 0.82
 EDGE = 0.07
 """Softness of the iris's edges, in iris radii."""
 
+SIEVE = (0, 2, 3, 1)
+"""The order in which a pixel's four samples (left to right, top to bottom) are set as opacity grows."""
+
 BACKGROUND_TOP = (248, 248, 250)
 BACKGROUND_BOTTOM = (222, 224, 229)
 
@@ -86,7 +89,7 @@ def shade(attributes: Floats32, facing: Floats32) -> Floats32:
 
 def _lambert(nx: Floats32, ny: Floats32, nz: Floats32, light: tuple[float, float, float], wrap: float) -> Floats32:
     x, y, z = (np.float32(c / (1.0 + wrap)) for c in light)
-    out = nx * x + ny * y + nz * z
+    out: Floats32 = nx * x + ny * y + nz * z
     if wrap:
         out += np.float32(wrap / (1.0 + wrap))
     np.maximum(out, 0, out=out)
@@ -120,6 +123,21 @@ def _step(radius: Floats32, at: float, softness: float = EDGE) -> Floats32:
     t = np.clip((radius - np.float32(at - softness)) * np.float32(0.5 / softness), 0, 1)
     smooth: Floats32 = t * t * (np.float32(3) - np.float32(2) * t)
     return smooth
+
+
+def tint_by_decal(albedo: Floats32, u: Floats32, v: Floats32, image: UInt8) -> None:
+    """Multiply a decal into the linear albedo (3, p) of pixels, in place; u, v are (p,)."""
+    height, width = image.shape[:2]
+    column = np.floor(u * np.float32(width)).astype(np.int32)
+    row = np.floor(v * np.float32(height)).astype(np.int32)
+    inside = np.flatnonzero((column >= 0) & (column < width) & (row >= 0) & (row < height))
+    texel = image[row[inside], column[inside]].astype(np.float32) * np.float32(1 / 255)
+    albedo[:, inside] *= (texel * texel).T
+
+
+def sieve(x: NDArray[np.int64], y: NDArray[np.int64], quarters: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which samples a surface of so many quarters opacity sets; x, y count samples from the upper left."""
+    return np.asarray(SIEVE)[(x & 1) + 2 * (y & 1)] < quarters
 
 
 def encode(linear: Floats32) -> UInt8:

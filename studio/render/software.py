@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from fba.arrays import Floats, Floats32, Ints
 from studio.render.camera import Camera
-from studio.render.drawable import ATTRIBUTES, Drawable, corner_attributes
+from studio.render.drawable import Drawable, corner_attributes
 from studio.render.protocol import depth_range, project
-from studio.render.shading import SAMPLES, UInt8, encode, paint_iris, resolve, shade
+from studio.render.shading import SAMPLES, UInt8, encode, paint_iris, resolve, shade, sieve, tint_by_decal
 
 EMPTY = np.iinfo(np.int64).max
+FORESHORTENED = 0.01
+"""Relative difference of distance between a triangle's corners from which perspective is followed inside it."""
 MIN_W = 1e-3
 """Triangles with a corner nearer to the lens than this fraction of its distance are left out."""
 
@@ -36,42 +38,49 @@ class SoftwareRenderer:
         drawables = [d for d in drawables if len(d.triangles)]
         if drawables:
             matrix = camera.clip_matrix(width, height, *depth_range(drawables, camera))
-            corners = np.concatenate([_screen(d, matrix, wide, high) for d in drawables])
-            hit, triangle = nearest_triangles(corners, wide, high)
-            samples[hit, :3] = _colors(drawables, camera, corners, hit, triangle, wide)
+            placed = [_screen(d, matrix, wide, high) for d in drawables]
+            corners, w = (np.concatenate([p[k] for p in placed]) for k in range(2))
+            quarters = np.concatenate([np.full(len(d.triangles), round(4 * d.opacity)) for d in drawables])
+            hit, triangle = nearest_triangles(corners, wide, high, quarters)
+            samples[hit, :3] = _colors(drawables, camera, corners, w, hit, triangle, wide)
             samples[hit, 3] = 255
         return resolve(samples.reshape(high, wide, 4))
 
 
-def _screen(drawable: Drawable, matrix: Floats, width: int, height: int) -> Floats:
-    """(t, 3, 3) corners: pixel x, pixel y (downwards), depth -1..1; NaN for triangles behind the lens."""
+def _screen(drawable: Drawable, matrix: Floats, width: int, height: int) -> tuple[Floats, Floats]:
+    """Corners (t, 3, 3): pixel x, pixel y (downwards), depth -1..1, NaN for triangles behind the lens; and w (t, 3)."""
     ndc, w = project(drawable.vertices, matrix)
     place = np.empty_like(ndc)
     place[:, 0] = (ndc[:, 0] + 1.0) * (0.5 * width)
     place[:, 1] = (1.0 - ndc[:, 1]) * (0.5 * height)
     place[:, 2] = ndc[:, 2]
     place[w < MIN_W] = np.nan
-    return place[drawable.triangles]
+    return place[drawable.triangles], w[drawable.triangles]
 
 
-def nearest_triangles(corners: Floats, width: int, height: int) -> tuple[NDArray[np.int64], Ints]:
+def nearest_triangles(
+    corners: Floats, width: int, height: int, quarters: NDArray[np.int64] | None = None
+) -> tuple[NDArray[np.int64], Ints]:
     """Find which triangle each pixel sees.
 
     Parameters
     ----------
     corners : (t, 3, 3) pixel x, pixel y, depth (smaller is nearer, -1..1).
+    quarters : (t,) opacity of each triangle in quarters; None for 4.
 
     Returns
     -------
     hit : (p,) int64, the covered pixels (row * width + column), ascending.
     triangle : (p,) int32, the nearest triangle there; of equals the one with the lower number.
     """
-    keys = depth_keys(corners, width, height)
+    keys = depth_keys(corners, width, height, quarters)
     hit = np.flatnonzero(keys != EMPTY)
     return hit, (keys[hit] & 0xFFFFFFFF).astype(np.int32)
 
 
-def depth_keys(corners: Floats, width: int, height: int) -> NDArray[np.int64]:
+def depth_keys(
+    corners: Floats, width: int, height: int, quarters: NDArray[np.int64] | None = None
+) -> NDArray[np.int64]:
     """(height * width,) int64: depth in the high half, triangle in the low half; `EMPTY` where nothing is."""
     keys = np.full(width * height, EMPTY, dtype=np.int64)
     span_triangle, span_row, start, stop = _spans(corners, width, height)
@@ -91,7 +100,14 @@ def depth_keys(corners: Floats, width: int, height: int) -> NDArray[np.int64]:
     packed = np.empty((total, 2), dtype=np.int32)
     packed[:, _LOW] = span_triangle.astype(np.int32)[span]
     packed[:, 1 - _LOW] = np.clip(depth + np.float32(2), np.float32(1), np.float32(3)).view(np.int32)
-    np.minimum.at(keys, pixel, packed.reshape(-1).view(np.int64))
+    key = packed.reshape(-1).view(np.int64)
+    if quarters is not None and quarters.min(initial=4) < 4:
+        solid = quarters[span_triangle][span]
+        thin = np.flatnonzero(solid < 4)
+        kept = np.ones(total, dtype=bool)
+        kept[thin] = sieve(pixel[thin] % width, pixel[thin] // width, solid[thin])
+        key, pixel = key[kept], pixel[kept]
+    np.minimum.at(keys, pixel, key)
     return keys
 
 
@@ -156,6 +172,7 @@ def _colors(
     drawables: Sequence[Drawable],
     camera: Camera,
     corners: Floats,
+    w: Floats,
     hit: NDArray[np.int64],
     triangle: Ints,
     width: int,
@@ -164,19 +181,36 @@ def _colors(
     directions = camera.rotation()
     table = np.concatenate([corner_attributes(d, directions) for d in drawables])
     first, second = _weights(corners, hit, triangle, width)
+    _foreshorten(first, second, triangle, w)
     mixed = _mix(table, triangle, first, second)
     area = _signed_area(corners)
     facing = np.where(area < 0, np.float32(1), np.float32(-1))[triangle]
     start = 0
     for drawable in drawables:
         stop = start + len(drawable.triangles)
-        if drawable.iris is not None:
+        if drawable.iris is not None or drawable.decal is not None:
             mine = np.flatnonzero((triangle >= start) & (triangle < stop))
-            rest = drawable.iris.directions.astype(np.float32)[drawable.triangles]
-            turned = _mix(rest, triangle[mine] - start, first[mine], second[mine])
-            mixed[3:6, mine] = paint_iris(mixed[3:6, mine], turned, drawable.iris.angle, drawable.iris.color)
+            _paint(drawable, mixed, mine, triangle[mine] - start, first[mine], second[mine])
         start = stop
     return encode(shade(mixed, facing)).T
+
+
+def _paint(
+    drawable: Drawable, mixed: Floats32, mine: NDArray[np.int64], triangle: Ints, first: Floats32, second: Floats32
+) -> None:
+    """Change the albedo of one drawable's pixels by its iris and its decal."""
+    if drawable.iris is not None:
+        rest = drawable.iris.directions.astype(np.float32)[drawable.triangles]
+        turned = _mix(rest, triangle, first, second)
+        mixed[3:6, mine] = paint_iris(mixed[3:6, mine], turned, drawable.iris.angle, drawable.iris.color)
+    if drawable.decal is not None:
+        uv = drawable.decal.uv.astype(np.float32)
+        touched = ((uv.max(axis=1) >= 0) & (uv.min(axis=1) <= 1)).all(axis=1)
+        some = np.flatnonzero(touched[triangle])
+        u, v = _mix(uv, triangle[some], first[some], second[some])
+        albedo = mixed[3:6, mine[some]]
+        tint_by_decal(albedo, u, v, drawable.decal.image)
+        mixed[3:6, mine[some]] = albedo
 
 
 def _signed_area(corners: Floats) -> Floats:
@@ -197,6 +231,19 @@ def _weights(corners: Floats, hit: NDArray[np.int64], triangle: Ints, width: int
     return first, second
 
 
+def _foreshorten(first: Floats32, second: Floats32, triangle: Ints, w: Floats) -> None:
+    """Turn weights in the picture into weights on the surface, in place, for triangles that reach far into depth."""
+    ratios = (w[:, :1] / w[:, 1:]).astype(np.float32)
+    deep = np.abs(ratios - np.float32(1)).max(axis=1, initial=0) > FORESHORTENED
+    if not deep.any():
+        return
+    some = np.flatnonzero(deep[triangle])
+    a = first[some] * ratios[triangle[some], 0]
+    b = second[some] * ratios[triangle[some], 1]
+    total = np.float32(1) - first[some] - second[some] + a + b
+    first[some], second[some] = a / total, b / total
+
+
 def _mix(table: Floats32, triangle: Ints, first: Floats32, second: Floats32) -> Floats32:
     """Interpolate (t, 3, c) corner values at pixels: (c, p)."""
     count = table.shape[2]
@@ -207,6 +254,3 @@ def _mix(table: Floats32, triangle: Ints, first: Floats32, second: Floats32) -> 
         out[k] += (table[:, 1, k] - base)[triangle] * first
         out[k] += (table[:, 2, k] - base)[triangle] * second
     return out
-
-
-__all__ = ["ATTRIBUTES", "EMPTY", "SoftwareRenderer", "depth_keys", "nearest_triangles"]
