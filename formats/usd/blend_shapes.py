@@ -1,0 +1,162 @@
+"""FaceDefMesh as UsdSkel blend shapes with inbetweens, and back; plain targets as well.
+
+Weight 1 is the last positive border of the intervals; every other border is an inbetween at ``border / last``,
+negative ones too, with the displacement accumulated there. UsdSkel goes linearly from one to the next, and on
+beyond the last, which is what the standard says of a FaceDefMesh.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Usd, UsdSkel
+
+from fat.intervals import interval_weights
+from fat.tables import FaceDefMesh, FaceDefTable
+from fba.arrays import Floats, Floats32, Ints
+from fba.errors import FaceDefTablesError, InputFileError
+from fba.faps import fap
+from fba.fapu import Fapu
+from formats.usd.axes import StageAxes
+from formats.usd.names import Namer
+from formats.usd.properties import ints, need, put, put_array, rows, to_single, vt
+
+AGREEMENT = 1e-5
+"""Offsets that differ from what the slopes give by less than this share of the largest are rounding."""
+
+
+class MeshTargets:
+    """Collects the blend shapes of one mesh and binds them to it."""
+
+    def __init__(self, mesh: Usd.Prim, namer: Namer) -> None:
+        self.mesh = mesh
+        self._namer = namer
+        self._tokens: list[str] = []
+        self._paths: list[Sdf.Path] = []
+
+    @property
+    def tokens(self) -> tuple[str, ...]:
+        """Names of the blend shapes so far, as a SkelAnimation has to list them."""
+        return tuple(self._tokens)
+
+    def add(self, name: str, index: Ints, offsets: NDArray[np.float32]) -> UsdSkel.BlendShape:
+        """Author a blend shape.
+
+        Parameters
+        ----------
+        index : (k,) vertices that move.
+        offsets : (k, 3) at weight 1, stage axes.
+        """
+        token = self._namer.name(name)
+        path = self.mesh.GetPath().AppendChild(token)
+        shape = UsdSkel.BlendShape.Define(self.mesh.GetStage(), path)
+        shape.CreateOffsetsAttr(vt(offsets))
+        shape.CreatePointIndicesAttr(vt(index))
+        self._tokens.append(token)
+        self._paths.append(path)
+        return shape
+
+    def bind(self, skeleton: Sdf.Path) -> None:
+        """Tell the mesh its blend shapes and the skeleton whose animation drives them."""
+        binding = UsdSkel.BindingAPI.Apply(self.mesh)
+        binding.CreateSkeletonRel().SetTargets([skeleton])
+        binding.CreateBlendShapesAttr(self._tokens)
+        binding.CreateBlendShapeTargetsRel().SetTargets(self._paths)
+
+
+def full_value(borders: Ints) -> int:
+    """The FAP value at weight 1: the last positive border, or the size of the first where none is positive."""
+    last = int(borders[-1])
+    return last if last > 0 else -int(borders[0])
+
+
+def write_face_def_mesh(
+    targets: MeshTargets, table: FaceDefTable, mesh: FaceDefMesh, fapu: Fapu, axes: StageAxes
+) -> Sdf.Path:
+    """Author one FaceDefMesh as a blend shape; its slopes are kept exactly beside the offsets."""
+    full = full_value(mesh.interval_borders)
+    places = _inbetween_borders(mesh.interval_borders, full)
+    offsets = _offsets(mesh, [full, *places], fapu.unit(fap(table.fap_id).unit), axes)
+    if not np.all(np.isfinite(offsets)):
+        raise FaceDefTablesError(f"{table.name} moves '{mesh.shape}' further than 32-bit numbers can say")
+    shape = targets.add(table.name, mesh.coord_index, offsets[0])
+    for border, values in zip(places, offsets[1:], strict=True):
+        inbetween = shape.CreateInbetween(f"at_{border}".replace("-", "minus_"))
+        inbetween.SetWeight(border / full)
+        inbetween.SetOffsets(vt(values))
+    prim = shape.GetPrim()
+    put(prim, "fapID", Sdf.ValueTypeNames.Int, table.fap_id)
+    put(prim, "highLevelSelect", Sdf.ValueTypeNames.Int, table.high_level_select)
+    put(prim, "valueAtWeightOne", Sdf.ValueTypeNames.Int, full)
+    put_array(prim, "intervalBorders", mesh.interval_borders)
+    put_array(prim, "slopes", to_single(axes.vectors(mesh.displacements)).reshape(-1, 3))
+    return shape.GetPath()
+
+
+def _inbetween_borders(borders: Ints, full: int) -> list[int]:
+    return [int(b) for b in borders if b not in (0, full)]
+
+
+def _offsets(mesh: FaceDefMesh, values: list[int], unit: float, axes: StageAxes) -> NDArray[np.float32]:
+    """Accumulated displacements (v, k, 3) at FAP values, stage axes."""
+    weights = interval_weights(mesh.interval_borders, values) * unit
+    places = np.einsum("vj,kjc->vkc", weights, mesh.displacements.astype(np.float64))
+    return to_single(axes.vectors(places))
+
+
+def read_face_def_mesh(prim: Usd.Prim, shape: str, fap_id: int, fapu: Fapu, axes: StageAxes) -> FaceDefMesh:
+    """Read a FaceDefMesh back.
+
+    The exact slopes are used while the offsets agree with them. Where another program has changed the offsets,
+    these are turned into slopes.
+
+    Raises
+    ------
+    InputFileError
+        If the attributes contradict each other.
+    """
+    blend = UsdSkel.BlendShape(prim)
+    borders = ints(need(prim, "intervalBorders"))
+    index = ints(blend.GetPointIndicesAttr().Get() or [])
+    slopes = rows(need(prim, "slopes"), 3)
+    unit = fapu.unit(fap(fap_id).unit)
+    full = full_value(borders)
+    values = [full, *_inbetween_borders(borders, full)]
+    stored = _stored_offsets(blend, values, index.size)
+    try:
+        if slopes.size == index.size * (borders.size - 1) * 3:
+            mesh = FaceDefMesh(shape, borders, index, _inside(slopes.reshape(index.size, -1, 3), axes))
+            again = _offsets(mesh, values, unit, axes)
+            if np.abs(again - stored).max(initial=0.0) <= AGREEMENT * np.abs(stored).max(initial=0.0):
+                return mesh
+        return FaceDefMesh(shape, borders, index, _inside(_slopes(borders, values, stored, unit), axes))
+    except FaceDefTablesError as error:
+        raise InputFileError(f"{prim.GetPath()} is damaged: {error}") from error
+
+
+def _inside(slopes: NDArray[Any], axes: StageAxes) -> Floats32:
+    turned: Floats32 = to_single(axes.frame.from_file(slopes))
+    return turned
+
+
+def _stored_offsets(blend: UsdSkel.BlendShape, values: list[int], count: int) -> NDArray[np.float32]:
+    full = values[0]
+    found = [rows(blend.GetOffsetsAttr().Get(), 3)]
+    by_weight = {np.float32(i.GetWeight()): i for i in blend.GetInbetweens()}
+    for value in values[1:]:
+        inbetween = by_weight.get(np.float32(value / full))
+        if inbetween is None:
+            raise InputFileError(f"{blend.GetPath()} has no inbetween for the border {value} (weight {value / full:g})")
+        found.append(rows(inbetween.GetOffsets(), 3))
+    if any(len(f) != count for f in found):
+        raise InputFileError(f"{blend.GetPath()} has offsets of {len(found[0])} points, but {count} point indices")
+    return np.stack(found)
+
+
+def _slopes(borders: Ints, values: list[int], offsets: NDArray[np.float32], unit: float) -> Floats:
+    """Slopes (k, b-1, 3) whose accumulated displacements at these values are the offsets (v, k, 3)."""
+    weights = interval_weights(borders, values) * unit
+    slopes: Floats = np.einsum("jv,vkc->kjc", np.linalg.inv(weights), offsets.astype(np.float64))
+    return slopes

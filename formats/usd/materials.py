@@ -1,0 +1,158 @@
+"""Materials as UsdPreviewSurface networks, and back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from pxr import Gf, Sdf, Tf, Usd, UsdShade
+
+from fba.mesh import Material
+from formats.usd.names import Namer, name_of, put_name
+from formats.usd.properties import get, put, put_string
+
+Color = tuple[float, float, float]
+UV_PRIMVAR = "st"
+_DEFAULT_ROUGHNESS = 0.5
+_DEFAULT_DIFFUSE: Color = (0.18, 0.18, 0.18)
+"""UsdPreviewSurface's own values for inputs that are not authored."""
+
+
+class MaterialLibrary:
+    """Writes every different material of a stage once."""
+
+    def __init__(self, stage: Usd.Stage, scope: Sdf.Path) -> None:
+        self._stage = stage
+        self._scope = scope
+        self._namer = Namer()
+        self._paths: dict[tuple[Material, int], Sdf.Path] = {}
+
+    def paths(self, materials: tuple[Material, ...]) -> list[Sdf.Path]:
+        """Prims of a shape's materials; one that the shape lists twice gets two prims."""
+        found = []
+        for place, material in enumerate(materials):
+            key = (material, materials[:place].count(material))
+            if key not in self._paths:
+                self._paths[key] = self._write(material)
+            found.append(self._paths[key])
+        return found
+
+    def _write(self, material: Material) -> Sdf.Path:
+        if not self._paths:
+            self._stage.DefinePrim(self._scope, "Scope")
+        path = self._scope.AppendChild(self._namer.name(material.name or "material"))
+        prim = UsdShade.Material.Define(self._stage, path)
+        put_name(prim.GetPrim(), material.name)
+        surface = UsdShade.Shader.Define(self._stage, path.AppendChild("Surface"))
+        surface.CreateIdAttr("UsdPreviewSurface")
+        for name, color in _colors(material).items():
+            surface.CreateInput(name, Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*color))
+        for name, number in _numbers(material).items():
+            surface.CreateInput(name, Sdf.ValueTypeNames.Float).Set(number)
+        surface.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(1)
+        prim.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
+        if material.texture:
+            _write_texture(self._stage, path, surface, material.texture)
+        _write_exact(prim.GetPrim(), material)
+        return path
+
+
+def _colors(material: Material) -> dict[str, Color]:
+    return {
+        "diffuseColor": material.diffuse,
+        "specularColor": material.specular,
+        "emissiveColor": material.emissive,
+    }
+
+
+def _numbers(material: Material) -> dict[str, float]:
+    return {"roughness": 1.0 - material.shininess, "opacity": 1.0 - material.transparency}
+
+
+def _write_texture(stage: Usd.Stage, path: Sdf.Path, surface: UsdShade.Shader, texture: str) -> None:
+    try:
+        asset = Sdf.AssetPath(texture)
+    except Tf.ErrorException:
+        # Control characters have no place in an asset path; the name stays in the own attribute.
+        return
+    reader = UsdShade.Shader.Define(stage, path.AppendChild("TextureCoordinates"))
+    reader.CreateIdAttr("UsdPrimvarReader_float2")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set(UV_PRIMVAR)
+    uv = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+    image = UsdShade.Shader.Define(stage, path.AppendChild("Texture"))
+    image.CreateIdAttr("UsdUVTexture")
+    image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(asset)
+    for side in ("wrapS", "wrapT"):
+        image.CreateInput(side, Sdf.ValueTypeNames.Token).Set("repeat")
+    image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(uv)
+    color = image.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
+    surface.GetInput("diffuseColor").ConnectToSource(color)
+
+
+def _write_exact(prim: Usd.Prim, material: Material) -> None:
+    for name, color in _colors(material).items():
+        put(prim, name, Sdf.ValueTypeNames.Double3, Gf.Vec3d(*color))
+    for name in ("ambient_intensity", "shininess", "transparency"):
+        put(prim, name, Sdf.ValueTypeNames.Double, getattr(material, name))
+    if material.texture is not None:
+        put_string(prim, "texture", material.texture)
+
+
+def read_material(prim: Usd.Prim) -> Material:
+    """Read a material's preview surface; the exact values of an own material as long as they still agree."""
+    shader = _surface(prim)
+    diffuse = _color(prim, shader, "diffuseColor", _DEFAULT_DIFFUSE)
+    specular = _color(prim, shader, "specularColor", (0.0, 0.0, 0.0))
+    emissive = _color(prim, shader, "emissiveColor", (0.0, 0.0, 0.0))
+    material = Material(name_of(prim), diffuse, specular=specular, emissive=emissive, texture=_texture(prim, shader))
+    ambient = get(prim, "ambient_intensity")
+    if ambient is not None:
+        material = replace(material, ambient_intensity=float(ambient))
+    return replace(
+        material,
+        shininess=_number(prim, shader, "roughness", "shininess", _DEFAULT_ROUGHNESS),
+        transparency=_number(prim, shader, "opacity", "transparency", 1.0),
+    )
+
+
+def _surface(prim: Usd.Prim) -> UsdShade.Shader | None:
+    source = UsdShade.Material(prim).ComputeSurfaceSource()
+    return source[0] if source and source[0] else None
+
+
+def _input(shader: UsdShade.Shader | None, name: str) -> object:
+    wanted = shader.GetInput(name) if shader else None
+    return wanted.GetAttr().Get() if wanted else None
+
+
+def _color(prim: Usd.Prim, shader: UsdShade.Shader | None, name: str, default: Color) -> Color:
+    found = _input(shader, name)
+    single = np.array(default if found is None else found, dtype=np.float32)
+    exact = get(prim, name)
+    values = np.array(exact) if exact is not None else single
+    if not np.array_equal(values.astype(np.float32), single):
+        values = single
+    red, green, blue = (float(v) for v in values)
+    return red, green, blue
+
+
+def _number(prim: Usd.Prim, shader: UsdShade.Shader | None, name: str, own: str, default: float) -> float:
+    """One minus a shader input; the own exact value if that still agrees."""
+    found = _input(shader, name)
+    single = np.float32(default if found is None else found)  # type: ignore[arg-type]
+    exact = get(prim, own)
+    if exact is not None and np.float32(1.0 - exact) == single:
+        return float(exact)
+    return 1.0 - float(single)
+
+
+def _texture(prim: Usd.Prim, shader: UsdShade.Shader | None) -> str | None:
+    own = get(prim, "texture")
+    color = shader.GetInput("diffuseColor") if shader else None
+    sources = color.GetConnectedSources()[0] if color else []
+    if sources:
+        image = UsdShade.Shader(sources[0].source.GetPrim())
+        asset = _input(image, "file")
+        if asset is not None:
+            return str(asset.path)  # type: ignore[attr-defined]
+    return None if own is None else str(own)

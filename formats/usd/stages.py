@@ -1,0 +1,78 @@
+"""Opening and saving stages: one-line errors, a quiet stderr, outputs that are whole or absent."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from pxr import Sdf, Tf, Usd, UsdUtils
+
+from fba.errors import InputFileError, OutputFileError
+from formats.files import atomic_output, read_bytes
+
+_MAGIC = (b"#usda", b"#sdf", b"PXR-USDC", b"PK\x03\x04")
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep OpenUSD's warnings off stderr; its errors become exceptions as always."""
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield
+    finally:
+        del delegate
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turn what OpenUSD raises about a damaged file into one InputFileError."""
+    with quiet():
+        try:
+            yield
+        except (Tf.ErrorException, RuntimeError) as error:
+            raise InputFileError(f"{path} is not a readable USD file: {_first_message(error, path)}") from error
+
+
+def open_stage(path: Path) -> Usd.Stage:
+    """Open a stage with all its payloads. Call it inside `reading`.
+
+    Raises
+    ------
+    InputFileError
+        If the file is missing, empty or not USD, or if a file that it refers to cannot be opened.
+    """
+    if not read_bytes(path).startswith(_MAGIC):
+        raise InputFileError(f"{path} is not a USD file: it starts neither like .usda text nor like .usdc data")
+    stage = Usd.Stage.Open(str(path.absolute()))
+    problems = stage.GetCompositionErrors()
+    if problems:
+        raise InputFileError(
+            f"{path} refers to something that cannot be opened: {_one_line(str(problems[0]))} "
+            "Put the missing file in its place, or flatten the stage before reading."
+        )
+    return stage
+
+
+def save_layer(layer: Sdf.Layer, path: Path) -> None:
+    """Write a layer atomically: .usda as text, .usdc and .usd as data."""
+    kind = "usda" if path.suffix.lower() == ".usda" else "usdc"
+    with quiet(), atomic_output(path) as temporary:
+        try:
+            done = layer.Export(str(temporary.absolute()), args={"format": kind})
+        except Tf.ErrorException as error:
+            raise OutputFileError(f"cannot write {path}: {_first_message(error, path)}") from error
+        if not done:
+            raise OutputFileError(f"cannot write {path}; check that there is space left")
+
+
+def _first_message(error: Exception, path: Path) -> str:
+    found = re.search(r" : '(.*?)'\s*(?:\n|$)", str(error), re.DOTALL)
+    text = found.group(1) if found else str(error)
+    return _one_line(text.replace(str(path.absolute()), path.name))
+
+
+def _one_line(text: str) -> str:
+    line = " ".join(text.split())
+    return line if len(line) <= 300 else line[:300] + "..."
