@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cloning.contours import contour_anchors
 from cloning.labels import OPPOSITE, SIDES
 from cloning.surface import Surface
 from fba.arrays import Floats, Ints
@@ -71,11 +72,14 @@ def align(source: Surface, target: Surface, labels: Ints) -> Floats:
     (n_t, 3) positions in the source's space (eye separations of the source).
     """
     ids = anchor_ids(source, target)
+    mine, yours = contour_anchors(source), contour_anchors(target)
+    shared = [name for name in yours if name in mine]
     moved = np.empty_like(target.vertices)
     for number in np.unique(labels):
         some = points_for_label(ids, int(number))
-        anchors = np.array([target.positions[i] for i in some])
-        goals = np.array([source.positions[i] for i in some])
+        more = [name for name in shared if not number or yours[name][0] != OPPOSITE[number]]
+        anchors = np.array([target.positions[i] for i in some] + [yours[name][1] for name in more])
+        goals = np.array([source.positions[i] for i in some] + [mine[name][1] for name in more])
         here = labels == number
         moved[here] = radial_warp(target.vertices[here], anchors, goals)
     return moved

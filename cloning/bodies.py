@@ -157,9 +157,7 @@ def tongue_mover(
     return move
 
 
-def _onto_tongue(
-    source: PreparedFace, target: PreparedFace, mine: Body, yours: Body, ids: Sequence[str]
-) -> Floats:
+def _onto_tongue(source: PreparedFace, target: PreparedFace, mine: Body, yours: Body, ids: Sequence[str]) -> Floats:
     """Target tongue vertices in the source's space: similarity by the tongue's points, or by bounding boxes."""
     if len(ids) >= 3:
         a = np.array([target.place(i) for i in ids])

@@ -162,9 +162,7 @@ def clone_shapes(
     rest = {s.name: np.zeros((s.mesh.vertex_count, 3)) for s in yours.scene.shapes}
     deltas = np.stack([to_file_order(yours.scene, yours.scene.gather({**rest, **o})) for o in offsets])
     neutral = to_file_order(yours.scene, yours.scene.world_neutral())
-    return ShapeSet(shapes.names, neutral, deltas), _report(
-        transfer, way.name, as_published, len(motions), stages, []
-    )
+    return ShapeSet(shapes.names, neutral, deltas), _report(transfer, way.name, as_published, len(motions), stages, [])
 
 
 def _target(onto: FaceScene | AnimatableFace, landmarks: FeaturePoints | None) -> tuple[FaceScene, FeaturePoints]:
@@ -214,9 +212,7 @@ def _reshaped(offsets: Mapping[str, Floats], old: FaceScene, new: FaceScene) -> 
     return {name: part for name, part in new.scatter(joined).items() if np.any(part)}
 
 
-def _carry(
-    transfer: FaceTransfer, motions: Sequence[Mapping[str, Floats]], stages: _Stages
-) -> list[dict[str, Floats]]:
+def _carry(transfer: FaceTransfer, motions: Sequence[Mapping[str, Floats]], stages: _Stages) -> list[dict[str, Floats]]:
     start = perf_counter()
     progress = stages.progress
     tick = None if progress is None else (lambda share: progress("motion", share))

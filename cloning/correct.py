@@ -28,6 +28,9 @@ NARROWEST = 0.03
 ACTIVE = 0.04
 """Skin that moves more than this share of a motion's largest offset takes the full correction."""
 
+TRUSTED = 0.3
+"""Feature points on skin that is less active than this count less and less: nearly nothing moves there."""
+
 
 @dataclass(frozen=True, eq=False)
 class Correction:
@@ -59,21 +62,36 @@ class Correction:
         k, count = len(self.ids), motion.shape[1]
         flat = motion.reshape(len(motion), -1)
         before = goals - (self.evaluate @ flat).reshape(k, count, 3)
-        size = np.linalg.norm(motion, axis=2)
-        active = _smooth_step(size / np.maximum(ACTIVE * size.max(axis=0), 1e-300))
+        active = self._activity(motion, goals)
         support = np.unique(self.evaluate.indices)
         at_points = self.evaluate[:, support].toarray()
         at_support = self.bumps[support].toarray()
         heights = np.zeros((k, count, 3))
         for m in range(count):
-            system = at_points @ (active[support, m, None] * at_support)
+            here = active[support, m]
+            rows = np.clip(at_points @ here / TRUSTED, 0.0, 1.0)[:, None]
+            system = rows * (at_points @ (here[:, None] * at_support))
             normal = system.T @ system
             normal[np.diag_indices(k)] += 1e-8 * max(float(np.trace(normal)) / k, 1e-30)
-            heights[:, m] = np.linalg.solve(normal, system.T @ before[:, m])
+            heights[:, m] = np.linalg.solve(normal, system.T @ (rows * before[:, m]))
         added = (self.bumps @ heights.reshape(k, -1)).reshape(motion.shape)
         motion += added * active[:, :, None]
         after = goals - (self.evaluate @ motion.reshape(len(motion), -1)).reshape(k, count, 3)
         return before, after
+
+
+    def _activity(self, motion: Floats, goals: Floats) -> Floats:
+        """(n, K) 0 where the skin rests and may not be moved, up to 1 where it moves or a feature point must."""
+        size = np.linalg.norm(motion, axis=2)
+        largest = np.maximum(size.max(axis=0), np.linalg.norm(goals, axis=2).max(axis=0))
+        limit = np.maximum(ACTIVE * largest, 1e-300)
+        active = _smooth_step(size / limit)
+        wanted = _smooth_step(np.linalg.norm(goals, axis=2) / limit)
+        for point in range(len(self.ids)):
+            column = self.bumps[:, [point]].tocoo()
+            rows, height = column.coords[0], column.data
+            active[rows] = np.maximum(active[rows], height[:, None] * wanted[point])
+        return active
 
 
 def _smooth_step(t: Floats) -> Floats:

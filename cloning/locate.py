@@ -53,9 +53,7 @@ def closest(
     usable : (t,) bool, triangles that may be chosen; None = all.
     """
     n = len(points)
-    found = Places(
-        np.full(n, -1, np.int32), np.zeros((n, 3)), np.full(n, np.inf), np.full(n, -1.0)
-    )
+    found = Places(np.full(n, -1, np.int32), np.zeros((n, 3)), np.full(n, np.inf), np.full(n, -1.0))
     corner_labels = vertex_labels[triangles]
     for number in np.unique(labels):
         mask = np.ones(len(triangles), bool) if usable is None else usable.copy()

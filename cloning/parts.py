@@ -166,9 +166,7 @@ def _roles(scene: FaceScene, points: FeaturePoints, pieces: _Pieces) -> list[Rol
     return roles
 
 
-def _mark_eye(
-    pupil: Floats, piece: int | None, role: Role, roles: list[Role], pieces: _Pieces, main: int
-) -> None:
+def _mark_eye(pupil: Floats, piece: int | None, role: Role, roles: list[Role], pieces: _Pieces, main: int) -> None:
     """Mark the eyeball below a pupil and the layers around the same centre."""
     if piece is None or piece == main:
         near = [
@@ -219,8 +217,11 @@ def _grow_teeth(roles: list[Role], pieces: _Pieces) -> None:
             if roles[k] is not Role.OTHER:
                 continue
             best = min(
-                ((_gap(v, w) + 2.0 * abs(float(v[:, 1].mean() - w[:, 1].mean())), _gap(v, w), role, w)
-                 for role, some in known.items() for w in some),
+                (
+                    (_gap(v, w) + 2.0 * abs(float(v[:, 1].mean() - w[:, 1].mean())), _gap(v, w), role, w)
+                    for role, some in known.items()
+                    for w in some
+                ),
                 key=lambda row: row[0],
             )
             if best[1] < 0.3 * size and abs(v[:, 1].mean() - best[3][:, 1].mean()) < 0.6 * size and _compact(v, size):

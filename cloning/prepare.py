@@ -95,26 +95,38 @@ def complete_points(scene: FaceScene, points: FeaturePoints, who: str) -> tuple[
             middle = np.mean([place[i] for i in ids], axis=0)
             added[pupil] = FeaturePoint.free(middle, source="derived", confidence=0.5)
             findings.append(
-                Finding("warning", "derived-point", f"{who}: {pupil} (pupil) is not given; the middle of the "
-                        "eye opening is used, and the FAPUs depend on it", pupil)
+                Finding(
+                    "warning",
+                    "derived-point",
+                    f"{who}: {pupil} (pupil) is not given; the middle of the "
+                    "eye opening is used, and the FAPUs depend on it",
+                    pupil,
+                )
             )
     points = points.with_points(added)
-    points.require(*NECESSARY, purpose=f"cloning onto the target '{scene.name}'" if who == "target" else
-                   f"cloning from the source '{scene.name}'")
+    points.require(
+        *NECESSARY,
+        purpose=f"cloning onto the target '{scene.name}'"
+        if who == "target"
+        else f"cloning from the source '{scene.name}'",
+    )
     known = feature_point_definitions()
     wanted = [i for i in known if i not in OPTIONAL and i not in INSIDE and not i.startswith("10.")]
     absent = [i for i in wanted if i not in points]
     if absent:
         findings.append(
-            Finding("warning", "missing-points", f"{who}: feature points {', '.join(absent)} are not given; the faces "
-                    "are aligned without them, less exactly around there", scene.name)
+            Finding(
+                "warning",
+                "missing-points",
+                f"{who}: feature points {', '.join(absent)} are not given; the faces "
+                "are aligned without them, less exactly around there",
+                scene.name,
+            )
         )
     return points, findings
 
 
-def _pivots(
-    scene: FaceScene, points: FeaturePoints, fapu: Fapu, who: str
-) -> tuple[FeaturePoints, list[Finding]]:
+def _pivots(scene: FaceScene, points: FeaturePoints, fapu: Fapu, who: str) -> tuple[FeaturePoints, list[Finding]]:
     """Derive 7.1 (top of the spine) and 7.2 (base of the neck) where they are missing."""
     place = points.positions(scene)
     added: dict[str, FeaturePoint] = {}
@@ -139,11 +151,20 @@ def _pivots(
 
 def _sealed(labels: Labels, where: str) -> list[Finding]:
     said = {
-        1: ("sealed-mouth", "the lips are grown together, so the mouth cannot open: the skin between them stretches "
-            "smoothly instead. Cut the mesh along the lip line to let it open"),
-        3: ("sealed-left-eye", "the left eye's lids are grown together or closed over the eye; a blink moves the skin "
-            "but shows no eyeball"),
-        5: ("sealed-right-eye", "the right eye's lids are grown together or closed over the eye; a blink moves the "
-            "skin but shows no eyeball"),
+        1: (
+            "sealed-mouth",
+            "the lips are grown together, so the mouth cannot open: the skin between them stretches "
+            "smoothly instead. Cut the mesh along the lip line to let it open",
+        ),
+        3: (
+            "sealed-left-eye",
+            "the left eye's lids are grown together or closed over the eye; a blink moves the skin "
+            "but shows no eyeball",
+        ),
+        5: (
+            "sealed-right-eye",
+            "the right eye's lids are grown together or closed over the eye; a blink moves the "
+            "skin but shows no eyeball",
+        ),
     }
     return [Finding("warning", *said[k], where) for k in labels.sealed]

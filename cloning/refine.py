@@ -74,9 +74,7 @@ def refine(indices: Ints, offsets: Ints, n: int) -> Refinement:
     return Refinement((plain @ raised).tocsr(), parents, (corners.ravel(), np.arange(k + 1, dtype=np.int32) * 4))
 
 
-def _vertex_rule(
-    indices: Ints, edges: Ints, inner: Any, face_of: Ints, face_points: Any, middles: Any, n: int
-) -> Any:
+def _vertex_rule(indices: Ints, edges: Ints, inner: Any, face_of: Ints, face_points: Any, middles: Any, n: int) -> Any:
     """Where the old vertices go, as a sparse matrix (n, n)."""
     from scipy.sparse import csr_array, diags_array, eye_array
 

@@ -68,9 +68,7 @@ class FaceTransfer:
     findings: tuple[Finding, ...] = ()
     tally: Tally = field(default_factory=Tally)
 
-    def apply(
-        self, motions: Sequence[Offsets], tick: Callable[[float], None] | None = None
-    ) -> list[dict[str, Floats]]:
+    def apply(self, motions: Sequence[Offsets], tick: Callable[[float], None] | None = None) -> list[dict[str, Floats]]:
         """Carry motions: each a mapping shape -> (n, 3) world offsets, mesh units.
 
         Returns
@@ -162,8 +160,12 @@ def _pair(
         if mine is None:
             words = role.value.replace("_", " ")
             findings.append(
-                Finding("warning", f"source-no-{role.value.replace('_', '-')}",
-                        f"the source has no {words}, so the target's {words} get no motion of their own", target.scene.name)
+                Finding(
+                    "warning",
+                    f"source-no-{role.value.replace('_', '-')}",
+                    f"the source has no {words}, so the target's {words} get no motion of their own",
+                    target.scene.name,
+                )
             )
             continue
         pairs.append((mine, yours, _mover(source, target, mine, yours, role, as_published)))

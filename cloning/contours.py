@@ -1,0 +1,117 @@
+"""The edges of lids and lips between their feature points: more anchors where faces must be aligned best.
+
+MPEG-4 has three points on the edge of a lid. Between them the edge is followed along the surface, on the side that
+looks outwards, and divided evenly, in the same way on both faces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from cloning.surface import Surface, symmetric_graph
+from fba.arrays import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Contour:
+    """One edge: its label (see `cloning.labels`), its feature points in order, and anchors between two of them."""
+
+    label: int
+    points: tuple[str, ...]
+    anchors: int
+
+
+CONTOURS = (
+    Contour(1, ("2.4", "2.6", "2.2", "2.7", "2.5"), 1),
+    Contour(2, ("2.4", "2.8", "2.3", "2.9", "2.5"), 1),
+    Contour(3, ("3.11", "3.1", "3.7"), 3),
+    Contour(4, ("3.11", "3.3", "3.7"), 3),
+    Contour(5, ("3.8", "3.2", "3.12"), 3),
+    Contour(6, ("3.8", "3.4", "3.12"), 3),
+)
+
+INWARD_COST = 4.0
+"""How much longer a way counts where the surface turns away from the outside."""
+
+DEPTH = 0.5
+"""The centre that "outside" is seen from lies this share of the edge's width behind its corners."""
+
+DETOUR = 1.6
+"""A way longer than this times the straight line does not follow an edge and gives no anchors."""
+
+
+def contour_anchors(surface: Surface) -> dict[str, tuple[int, Floats]]:
+    """Anchors on the edges of lips and lids.
+
+    Returns
+    -------
+    name -> (label of its edge, (3,) position); names are the same on every face.
+    """
+    found: dict[str, tuple[int, Floats]] = {}
+    for contour in CONTOURS:
+        if any(i not in surface.points for i in contour.points):
+            continue
+        graph, places = _outer_graph(surface, contour)
+        for a, b in pairwise(contour.points):
+            line = _path(graph, places, surface, a, b)
+            for k, position in enumerate(_divide(line, surface.positions, a, b, contour.anchors)):
+                found[f"{a}-{b}/{k + 1}"] = (contour.label, position)
+    return found
+
+
+def _outer_graph(surface: Surface, contour: Contour) -> tuple[object, Ints]:
+    """Graph of the skin around an edge in which the inner side is far, and the vertices that it is about."""
+    first, last = surface.positions[contour.points[0]], surface.positions[contour.points[-1]]
+    width = float(np.linalg.norm(first - last))
+    center = 0.5 * (first + last) - np.array([0.0, 0.0, DEPTH * width])
+    near = np.linalg.norm(surface.vertices - 0.5 * (first + last), axis=1) < 0.9 * width
+    places = np.flatnonzero(near)
+    new = np.full(surface.vertex_count, -1)
+    new[places] = np.arange(len(places))
+    outward = surface.vertices[places] - center
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-12)
+    facing = np.einsum("ij,ij->i", outward, surface.normals[places])
+    cost = 1.0 + INWARD_COST * np.clip(0.4 - facing, 0.0, 1.4)
+    full = surface.graph.tocoo()
+    rows, columns = full.coords
+    kept = near[rows] & near[columns] & (rows < columns)
+    pairs = np.stack([new[rows[kept]], new[columns[kept]]], axis=1)
+    lengths = full.data[kept] * 0.5 * (cost[pairs[:, 0]] + cost[pairs[:, 1]])
+    return symmetric_graph(pairs, lengths, len(places)), places.astype(np.int32)
+
+
+def _path(graph: object, places: Ints, surface: Surface, a: str, b: str) -> Floats | None:
+    """(k, 3) positions along the cheapest way between two feature points; None where there is none."""
+    from scipy.sparse.csgraph import dijkstra
+
+    new = {int(v): k for k, v in enumerate(places)}
+    ends = [int(v[np.argmax(w)]) for v, w in (surface.points[a], surface.points[b])]
+    if any(v not in new for v in ends):
+        return None
+    start, stop = (new[v] for v in ends)
+    before = dijkstra(graph, indices=np.array([start]), return_predecessors=True)[1][0]  # type: ignore[call-overload]
+    way = [stop]
+    while way[-1] != start:
+        if before[way[-1]] < 0:
+            return None
+        way.append(int(before[way[-1]]))
+    line: Floats = surface.vertices[places[np.array(way[::-1])]].copy()
+    line[0], line[-1] = surface.positions[a], surface.positions[b]
+    return line
+
+
+def _divide(
+    line: Floats | None, positions: Mapping[str, Floats], a: str, b: str, count: int
+) -> list[Floats]:
+    if line is None or len(line) < 2:
+        return []
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    if along[-1] > DETOUR * float(np.linalg.norm(positions[a] - positions[b])):
+        return []
+    at = along[-1] * np.arange(1, count + 1) / (count + 1)
+    return [np.array([np.interp(t, along, line[:, axis]) for axis in range(3)]) for t in at]
