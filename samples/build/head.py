@@ -78,8 +78,10 @@ class Head:
     @cached_property
     def surface_points(self) -> dict[str, Floats]:
         """Positions of all feature points on the cropped shapes."""
-        out = {}
+        out = {k: np.asarray(q.weights) @ self.parts["skin"][list(q.vertices)] for k, q in self.placed.items()}
         for key, row in _point_rows().items():
+            if key in out:
+                continue
             if "face" in row and int(row["face"][0]) in self.crop.places:
                 places = [self.crop.places[int(v)] for v in row["face"]]
                 corners = np.array([self.parts[shape][k] for shape, k in places])
@@ -115,7 +117,7 @@ class Head:
         """
         found = {}
         for key, row in _point_rows().items():
-            if key in self.surface_points:
+            if key in self.surface_points and key not in self.placed:
                 places = [self.crop.places[int(v)] for v in row["face"]]
                 kept = [(k, float(w)) for (_, k), w in zip(places, row["bary"], strict=True) if w > 0.0]
                 found[key] = FeaturePoint(places[0][0], tuple(k for k, _ in kept), tuple(w for _, w in kept))

@@ -13,13 +13,15 @@ class Border:
 
     value : FAP value.
     units : ARKit unit -> relative weight; the whole is scaled until the FAP's own point moves by its value.
-    part : "" = all of it; "left"/"right" half; "upper"/"lower" lip.
+    masks : names of `Masks` whose product splits the mix; none = all of it, teeth and tongue included.
+    axes : the only components that are kept, e.g. "x"; none = all.
     most : largest scale of the units; what is missing then comes from the local kernel of the own point.
     """
 
     value: int
     units: Units
-    part: str = ""
+    masks: tuple[str, ...] = ()
+    axes: str = ""
     most: float = 4.0
 
 
@@ -29,6 +31,7 @@ class Recipe:
 
     tied : further feature points that move by the same amount (inner and outer lip corner).
     carried : feature points that go along as they do in the units, in all axes.
+    lid : side and part of the eyelid whose rim has to close on a line; None for every other FAP.
     note : what a user should know.
     """
 
@@ -36,76 +39,80 @@ class Recipe:
     borders: tuple[Border, ...]
     tied: tuple[str, ...] = ()
     carried: tuple[str, ...] = ()
+    lid: tuple[str, str] | None = None
     note: str = ""
 
 
 LOWER_LIP = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
 LIP_CORNERS = ("2.4", "2.5", "8.3", "8.4")
 CHIN = ("2.1", "2.10")
-JAW = (*LOWER_LIP, *LIP_CORNERS, *CHIN)
+CHEEKS = ("5.1", "5.2")
+JAW = (*LOWER_LIP, *LIP_CORNERS, *CHIN, *CHEEKS)
+LIDS = ("3.1", "3.2", "3.3", "3.4")
 
-_TIED = "the inner and the outer lip corner move together; send one of the two FAPs"
+_TIED = "the inner and the outer lip corner move together; a stream should drive one of the two FAPs"
 
 
 def _both(name: str, weight: float = 1.0) -> Units:
     return {f"{name}Left": weight, f"{name}Right": weight}
 
 
-def _corner(fap: int, side: str, inner: str, outer: str, up: bool) -> list[Recipe]:
-    """The inner (fap) and the outer (fap + 47) corner of one side."""
-    if up:
-        borders = (Border(-300, {f"mouthFrown{side}": 1.0}), Border(600, {f"mouthSmile{side}": 1.0}))
-    else:
-        half = side.lower()
-        borders = (Border(-250, {"mouthPucker": 1.0}, half), Border(300, {f"mouthStretch{side}": 1.0}))
-    return [Recipe(fap, borders, (outer,), note=_TIED), Recipe(fap + 47, borders, (inner,), note=_TIED)]
+_UPPER_LIP_UP = {**_both("mouthUpperUp"), "mouthShrugUpper": 1.0}
+_LOWER_LIP_DOWN = _both("mouthLowerDown")
+_BROW_UP = {"browInnerUp": 1.0, **_both("browOuterUp", 2.0)}
+"""Mixes that move a whole lip or brow evenly; masks share them out between its feature points."""
+
+_CONTOUR = (
+    ((4, "2.2"), (8, "2.6"), (9, "2.7"), (51, "8.1"), (55, "8.5"), (56, "8.6")),
+    ((5, "2.3"), (10, "2.8"), (11, "2.9"), (52, "8.2"), (57, "8.7"), (58, "8.8")),
+)
+_BROW = ((31, "4.1", 250), (32, "4.2", 250), (33, "4.3", 200), (34, "4.4", 200), (35, "4.5", 150), (36, "4.6", 150))
 
 
-def _sided() -> list[Recipe]:
-    out: list[Recipe] = []
-    for k, side in enumerate(("Left", "Right")):
-        half = side.lower()
-        inner, outer = ("2.4", "2.5")[k], ("8.3", "8.4")[k]
-        up, down = {f"mouthUpperUp{side}": 1.0}, {f"mouthLowerDown{side}": 1.0}
-        out += _corner(6 + k, side, inner, outer, up=False)
-        out += _corner(12 + k, side, inner, outer, up=True)
-        out += [
-            Recipe(8 + k, (Border(-400, up),)),
-            Recipe(55 + k, (Border(-400, up),)),
-            Recipe(10 + k, (Border(-500, down),)),
-            Recipe(57 + k, (Border(-500, down),)),
-            Recipe(19 + k, (Border(-350, {f"eyeWide{side}": 1.0}), Border(1024, {f"eyeBlink{side}": 1.0}))),
-            Recipe(21 + k, (Border(600, {f"eyeSquint{side}": 1.0}),)),
-            Recipe(31 + k, (Border(-150, {f"browDown{side}": 1.0}), Border(250, {"browInnerUp": 1.0}, half))),
-            Recipe(
-                33 + k,
-                (Border(-150, {f"browDown{side}": 1.0}), Border(250, {f"browOuterUp{side}": 1.0}, most=3.0)),
-                note="the raise is completed by a local bump",
-            ),
-            Recipe(
-                35 + k,
-                (Border(-150, {f"browDown{side}": 1.0}), Border(200, {f"browOuterUp{side}": 1.0}, most=3.0)),
-                note="the raise is completed by a local bump",
-            ),
-            Recipe(37 + k, (Border(200, {f"browDown{side}": 1.0}),)),
-            Recipe(41 + k, (Border(300, {f"cheekSquint{side}": 1.0}),)),
-        ]
-    return out
+def _lips() -> list[Recipe]:
+    upper, lower = _CONTOUR
+    return [
+        *(Recipe(fap, (Border(-300, _UPPER_LIP_UP, (key,)),)) for fap, key in upper),
+        *(Recipe(fap, (Border(-300, _LOWER_LIP_DOWN, (key,)),)) for fap, key in lower),
+        Recipe(16, (Border(500, {"mouthPucker": 1.0}, ("lower", "mouth")),)),
+        Recipe(17, (Border(-400, {"mouthRollUpper": 1.0}), Border(500, {"mouthFunnel": 1.0}, ("upper", "mouth")))),
+    ]
+
+
+def _sided(k: int, side: str) -> list[Recipe]:
+    """The FAPs of one side but for lip contours and brows; k = 0 left, 1 right."""
+    half = side.lower()
+    corner = (f"corner_{half}",)
+    stretch = (Border(300, {f"mouthStretch{side}": 1.0, f"mouthDimple{side}": 1.0}, corner),)
+    raised = (Border(-300, {f"mouthFrown{side}": 1.0}, corner), Border(600, {f"mouthSmile{side}": 1.0}, corner))
+    inner, outer = ("2.4", "2.5")[k], ("8.3", "8.4")[k]
+    return [
+        Recipe(6 + k, stretch, (outer,), note=_TIED),
+        Recipe(53 + k, stretch, (inner,), note=_TIED),
+        Recipe(12 + k, raised, (outer,), note=_TIED),
+        Recipe(59 + k, raised, (inner,), note=_TIED),
+        Recipe(
+            19 + k,
+            (Border(-350, {f"eyeWide{side}": 1.0}), Border(1024, {f"eyeBlink{side}": 1.0})),
+            carried=LIDS,
+            lid=(half, "upper"),
+        ),
+        Recipe(21 + k, (Border(512, {f"eyeSquint{side}": 1.0}),), carried=LIDS, lid=(half, "lower")),
+        Recipe(37 + k, (Border(100, {f"browDown{side}": 1.0}, axes="x"),), carried=LIDS),
+        Recipe(41 + k, (Border(200, {f"cheekSquint{side}": 1.0}),), carried=LIDS),
+    ]
 
 
 RECIPES: tuple[Recipe, ...] = tuple(
     sorted(
         [
             Recipe(3, (Border(1024, {"jawOpen": 1.0}),), carried=JAW, note="practical: the jaw carries the lower lip"),
-            Recipe(4, (Border(-300, {"mouthShrugUpper": 1.0}),)),
-            Recipe(51, (Border(-300, {"mouthShrugUpper": 1.0}),)),
-            Recipe(5, (Border(-500, _both("mouthLowerDown")), Border(400, {"mouthShrugLower": 1.0}))),
-            Recipe(52, (Border(-500, _both("mouthLowerDown")), Border(400, {"mouthShrugLower": 1.0}))),
             Recipe(14, (Border(500, {"jawForward": 1.0}),), carried=JAW),
             Recipe(15, (Border(-300, {"jawLeft": 1.0}), Border(300, {"jawRight": 1.0})), carried=JAW),
-            Recipe(16, (Border(-400, {"mouthRollLower": 1.0}), Border(500, {"mouthPucker": 1.0}, "lower"))),
-            Recipe(17, (Border(-400, {"mouthRollUpper": 1.0}), Border(500, {"mouthFunnel": 1.0}, "upper"))),
-            *_sided(),
+            *_lips(),
+            *_sided(0, "Left"),
+            *_sided(1, "Right"),
+            *(Recipe(fap, (Border(value, _BROW_UP, (key,)),)) for fap, key, value in _BROW),
         ],
         key=lambda r: r.fap,
     )

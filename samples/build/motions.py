@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fat.motion import FaceMotion
 from fat.tables import table_name
 from fba.arrays import Floats
 from fba.faps import fap
 from samples.build.correction import Correction, PointAxis
-from samples.build.geodesic import distances, smoothstep
 from samples.build.head import Head
+from samples.build.lids import Lid
 from samples.build.low_level import Border, Recipe
-from samples.build.neutral import LOWER_LIP, UPPER_LIP
+from samples.build.masks import Masks
+from samples.build.neutral import lash_roots
 
 Offsets = dict[str, Floats]
 
@@ -32,20 +34,45 @@ class MotionBuilder:
         return Correction(self.head)
 
     def pose(self, units: Mapping[str, float]) -> Offsets:
-        """Weighted sum of units: shape -> (n, 3)."""
+        """Weighted sum of units: shape -> (n, 3). The upper teeth stay (mouthFunnel bends a few of them)."""
         total: Offsets = {}
         for name, weight in units.items():
             for shape, offsets in self.head.unit(name).items():
+                if shape == "upper_teeth":
+                    continue
                 total[shape] = total.get(shape, 0.0) + weight * offsets
         return total
 
-    def fap_motion(self, recipe: Recipe, border: Border) -> FaceMotion:
+    def fap_motions(self, recipe: Recipe) -> list[FaceMotion]:
+        """All borders of one FAP."""
+        motions = [self._border(recipe, border) for border in recipe.borders]
+        if recipe.lid is None:
+            return motions
+        lid = Lid(self.head, *recipe.lid)
+        return [step for motion in motions for step in self._lid_steps(lid, motion)]
+
+    def _lid_steps(self, lid: Lid, motion: FaceMotion) -> list[FaceMotion]:
+        """A lid's motion: opening as it is; closing in steps, because the lid slides over a ball."""
+        full = dict(motion.offsets)
+        if motion.value < 0:
+            return [motion]
+        skin = lid.closing(full["skin"], motion.value)
+        steps = []
+        for value in range(LID_STEP, motion.value + 1, LID_STEP):
+            share = value / motion.value
+            part = {name: share * offsets for name, offsets in full.items()}
+            steps.append(replace(motion, value=value, offsets=self._with_skin(part, lid.over_eyeball(share * skin))))
+        return steps
+
+    def _border(self, recipe: Recipe, border: Border) -> FaceMotion:
         """One border of one FAP: scaled, cleared of cross-talk, exact at its own feature point."""
         entry = fap(recipe.fap)
         direction = np.asarray(entry.direction)
         own = entry.feature_points[0]
         wanted = border.value * self.head.fapu.unit(entry.unit) * direction
-        raw = self._part(self.pose(border.units), border.part)
+        raw = self._masked(self.pose(border.units), border.masks)
+        if border.axes:
+            raw["skin"] = raw["skin"] * [float(axis in border.axes) for axis in "xyz"]
         moves = float(self.correction.at(own, raw["skin"]) @ direction)
         scale = min(float(wanted @ direction) / moves, border.most)
         raw = {name: scale * offsets for name, offsets in raw.items()}
@@ -59,41 +86,40 @@ class MotionBuilder:
         """The offsets with a corrected skin; the lashes follow the correction of the lid below them."""
         out = {**raw, "skin": skin}
         for name, nearest in self._lash_roots.items():
-            out[name] = raw[name] + (skin - raw["skin"])[nearest]
-        return {name: offsets for name, offsets in out.items() if np.any(offsets)}
+            out[name] = raw[name] + (skin - raw["skin"])[nearest] if name in raw else skin[nearest]
+        return _without_noise(out, NOISE * self.head.fapu.es0)
 
     @cached_property
-    def _lash_roots(self) -> dict[str, Floats]:
+    def _lash_roots(self) -> dict[str, NDArray[np.int64]]:
+        """The skin vertex next to the root of each vertex of the lashes."""
         from scipy.spatial import cKDTree
 
         tree = cKDTree(self.head.parts["skin"])
-        return {name: tree.query(self.head.parts[name])[1] for name in ("lashes_left", "lashes_right")}
+        roots = lash_roots(self.head)
+        return {name: np.asarray(tree.query(self.head.parts[name][rows])[1]) for name, rows in roots.items()}
 
-    def _part(self, offsets: Offsets, part: str) -> Offsets:
-        if not part:
+    def _masked(self, offsets: Offsets, names: Sequence[str]) -> Offsets:
+        """Only the skin's share under the product of these masks; everything, if there are none."""
+        if not names:
             return offsets
-        out = {name: np.zeros_like(values) for name, values in offsets.items()}
-        share = self._halves[part] if part in self._halves else self._lips[part]
-        out["skin"] = share[:, None] * offsets["skin"]
-        return out
+        share = np.prod([self.masks[name] for name in names], axis=0)
+        return {"skin": share[:, None] * offsets["skin"]}
 
     @cached_property
-    def _halves(self) -> dict[str, Floats]:
-        """Weights of the skin that split a symmetric unit smoothly into a left and a right one."""
-        x = self.head.parts["skin"][:, 0] / (HALF_WIDTH * self.head.fapu.es0)
-        left = 0.5 * (1.0 + np.tanh(x))
-        return {"left": left, "right": 1.0 - left}
-
-    @cached_property
-    def _lips(self) -> dict[str, Floats]:
-        """Weights that split a unit of the mouth into upper and lower lip, blended around the corners."""
-        mesh = self.head.scene.shape("skin").mesh
-        up, low = (distances(mesh, [self.head.points[k] for k in keys]).min(axis=0) for keys in (UPPER_LIP, LOWER_LIP))
-        upper = smoothstep(0.5 + (low - up) / (2.0 * LIP_BLEND * self.head.fapu.es0))
-        return {"upper": upper, "lower": 1.0 - upper}
+    def masks(self) -> Masks:
+        return Masks(self.head)
 
 
-HALF_WIDTH = 0.12
-"""Width (ES0) of the blend between the halves of the forehead and the mouth."""
-LIP_BLEND = 0.2
-"""Difference of distances (ES0) over which a point stops to belong to one lip."""
+LID_STEP = 256
+"""Between the borders of a closing lid: the chord of each step stays within 0.4 % of the eyeball's radius."""
+NOISE = 3e-4
+"""Offsets below this length (ES0) are what is left of a local correction far away; they become 0."""
+
+
+def _without_noise(offsets: Offsets, least: float) -> Offsets:
+    out = {}
+    for name, values in offsets.items():
+        moves = np.linalg.norm(values, axis=1) >= least
+        if moves.any():
+            out[name] = np.where(moves[:, None], values, 0.0)
+    return out

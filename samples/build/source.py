@@ -10,6 +10,7 @@ from fat.motion import FaceMotion
 from fat.rig import RigTables, rig_eye, rig_head
 from fat.tables import table_name
 from fba.fapu import FAPU_DIVISOR
+from fba.scene import FaceScene
 from samples.build.head import Head, build_head, macro
 from samples.build.high_level import high_level_motions
 from samples.build.low_level import RECIPES
@@ -19,7 +20,7 @@ from samples.build.neutral import neutral
 
 RACES = {"caucasian": 0.35, "asian": 0.35, "african": 0.3}
 SEXES = {"female": 0.6, "male": 0.4}
-THRUST = 300
+THRUST = 100
 """Border of the eyeball thrust, FAP 27 and 28."""
 
 
@@ -37,7 +38,7 @@ def build_source(makehuman: MakeHuman) -> AnimatableFace:
     """The animatable source: scene with nested eye and head rotations, feature points, tables."""
     head = source_head(makehuman)
     builder = MotionBuilder(head)
-    motions = [builder.fap_motion(recipe, border) for recipe in RECIPES for border in recipe.borders]
+    motions = [motion for recipe in RECIPES for motion in builder.fap_motions(recipe)]
     motions += eye_thrusts(head)
     motions += high_level_motions(builder)
     scene, transforms = _rig(head)
@@ -56,7 +57,7 @@ def eye_thrusts(head: Head) -> list[FaceMotion]:
     return out
 
 
-def _rig(head: Head) -> tuple[object, RigTables]:
+def _rig(head: Head) -> tuple[FaceScene, RigTables]:
     scene = head.scene
     tables: RigTables = {}
     for side in ("left", "right"):
