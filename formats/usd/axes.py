@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
 from fba.arrays import Floats
@@ -36,7 +38,7 @@ class StageAxes:
     frame: Frame
     up_axis: str
 
-    def vectors(self, values: Floats) -> Floats:
+    def vectors(self, values: NDArray[Any]) -> Floats:
         """(..., 3) vectors or points from inside axes to the stage's; exact."""
         return self.frame.to_file(values)
 

@@ -83,7 +83,7 @@ def _write_primvar(
     put_twin(mesh.GetPrim(), name, values)
 
 
-def _write_subset(mesh: UsdGeom.Mesh, name: str, faces: Ints, family: str) -> Usd.Prim:
+def _write_subset(mesh: UsdGeom.Mesh, name: str, faces: NDArray[np.integer[Any]], family: str) -> Usd.Prim:
     subset = UsdGeom.Subset.Define(mesh.GetPrim().GetStage(), mesh.GetPath().AppendChild(name))
     subset.CreateElementTypeAttr(UsdGeom.Tokens.face)
     subset.CreateFamilyNameAttr(family)

@@ -19,7 +19,7 @@ class Namer:
 
     def name(self, wanted: str) -> str:
         """A valid identifier like `wanted` that was not handed out before."""
-        base = Tf.MakeValidIdentifier(wanted)
+        base: str = Tf.MakeValidIdentifier(wanted)
         label, number = base, 1
         while label in self._taken:
             number += 1

@@ -31,8 +31,8 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
             own = draft.targets(shape.name)
             back = _inverse(scene, shape.name)
             for name, deltas in zip(shapes.names, shapes.deltas, strict=True):
-                local = scene.frame.from_file(deltas[places[shape.name]]) @ back.T
-                offsets = to_single(draft.axes.vectors(local))
+                inside: Floats = scene.frame.from_file(deltas[places[shape.name]]) @ back.T
+                offsets = to_single(draft.axes.vectors(inside))
                 index = np.flatnonzero(np.any(offsets != 0.0, axis=1)).astype(np.int32)
                 if index.size:
                     put_name(own.add(name, index, offsets[index]).GetPrim(), name)
@@ -60,7 +60,7 @@ def read_shapes(path: Path) -> ShapeSet | None:
         for shape in scene.shapes:
             linear = scene.world_matrix(shape.name)[:3, :3]
             for name, blend in _targets(prims[shape.name]):
-                local = axes.frame.from_file(_full(blend, shape.mesh.vertex_count))
+                local: Floats = axes.frame.from_file(_full(blend, shape.mesh.vertex_count))
                 found.setdefault(name, {})[shape.name] = local @ linear.T
         if not found:
             return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom
@@ -107,7 +108,7 @@ def read_placement(prim: Usd.Prim, axes: StageAxes) -> Placement:
     )
 
 
-def value_of(attribute: Usd.Attribute) -> object:
+def value_of(attribute: Usd.Attribute) -> Any:
     """The value of an attribute at rest: its default, or its first time sample when it has only these."""
     value = attribute.Get()
     return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
