@@ -1,0 +1,108 @@
+"""What a VRML or BT file held, kept beside the scene so that writing loses nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from fba.findings import Finding
+from fba.scene import Shape, Transform
+from formats.vrml97.tree import Field, Nodes, Numbers, Proto, Raw, Statement, Strings, Use, VrmlNode
+
+METADATA_DEF = "fba_toolkit"
+"""DEF name of the WorldInfo that carries what the standard's nodes cannot say."""
+
+MPEG4_NODES = frozenset(
+    {"Face", "FDP", "FAP", "FIT", "FaceDefTables", "FaceDefMesh", "FaceDefTransform", "Viseme", "Expression"}
+)
+
+
+@dataclass(frozen=True, eq=False)
+class VrmlDocument:
+    """A parsed file.
+
+    Attributes
+    ----------
+    statements : the file without its Face nodes (their scene graph stands in their place), without
+        declarations of the MPEG-4 nodes and without this toolkit's WorldInfo; every DEF is unique.
+    nodes : name of a shape or transform of the scene -> its node in `statements`.
+    parts : the same names -> the shape or transform as it was read, file axes.
+    findings : what the reader noticed.
+    """
+
+    statements: tuple[Statement, ...] = ()
+    nodes: Mapping[str, VrmlNode] = field(default_factory=dict)
+    parts: Mapping[str, Shape | Transform] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """A file taken apart: `statements` as in VrmlDocument, the Face nodes, and the strings of the WorldInfo."""
+
+    statements: tuple[Statement, ...]
+    faces: tuple[VrmlNode, ...]
+    metadata: tuple[str, ...]
+
+
+def split(statements: tuple[Statement, ...]) -> Split:
+    """Take Face nodes, declarations of MPEG-4 nodes, BT descriptors and the toolkit's WorldInfo out of a file."""
+    faces: list[VrmlNode] = []
+    strings: list[str] = []
+
+    def outside(items: Iterable[Any]) -> list[Any]:
+        out: list[Any] = []
+        for item in items:
+            if isinstance(item, Raw) or (isinstance(item, Proto) and item.name in MPEG4_NODES):
+                continue
+            if not isinstance(item, VrmlNode):
+                out.append(item)
+            elif item.type == "Face":
+                faces.append(item)
+                out.extend(outside(_scene_graph(item)))
+            elif item.def_name == METADATA_DEF and item.type == "WorldInfo":
+                info = item.get("info")
+                strings.extend(info.values if isinstance(info, Strings) else ())
+            else:
+                out.append(_without_faces(item))
+        return out
+
+    def _without_faces(item: VrmlNode) -> VrmlNode:
+        body = []
+        for part in item.body:
+            if isinstance(part, Field) and isinstance(part.value, Nodes) and any(part.value.items):
+                items = outside(part.value.items)
+                part = Field(part.name, Nodes(tuple(items), part.value.many or len(items) != 1))
+            body.append(part)
+        return replace(item, body=tuple(body))
+
+    kept = outside(_lifted(statements))
+    return Split(tuple(kept), tuple(faces), tuple(strings))
+
+
+def _scene_graph(face: VrmlNode) -> tuple[VrmlNode | Use, ...]:
+    fdp = next((n for n in face.nodes("fdp") if isinstance(n, VrmlNode)), None)
+    return () if fdp is None else fdp.nodes("faceSceneGraph")
+
+
+def _lifted(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
+    """BT has one top node: what its plain Group (or layer) holds counts as the top of the file."""
+    out: list[Statement] = []
+    for item in statements:
+        plain = isinstance(item, VrmlNode) and item.type == "Group" and item.def_name is None
+        if plain and isinstance(item, VrmlNode) and any(_is_face(n) for n in item.nodes("children")):
+            out.extend(item.nodes("children"))
+        else:
+            out.append(item)
+    return tuple(out)
+
+
+def _is_face(item: object) -> bool:
+    return isinstance(item, VrmlNode) and item.type == "Face"
+
+
+def flat_numbers(owner: VrmlNode, name: str) -> Numbers | None:
+    """A numeric field; None where it is absent or empty."""
+    value = owner.get(name)
+    return value if isinstance(value, Numbers) else None
