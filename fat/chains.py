@@ -49,6 +49,10 @@ class Chains:
                     raise FaceDefTablesError(
                         f"{table.name}: there is no Transform '{definition.transform}' in the scene"
                     )
+                if not np.isfinite(definition.rotation_def + definition.scale_def + definition.translation_def).all():
+                    raise FaceDefTablesError(
+                        f"{table.name}: the definition for '{definition.transform}' is not made of finite numbers"
+                    )
                 self._drivers.setdefault(definition.transform, []).append(_Driver(number, definition))
         self.rest = {shape.name: scene.world_matrix(shape.name) for shape in scene.shapes}
 

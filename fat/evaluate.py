@@ -17,7 +17,7 @@ from fat.intervals import IntervalRule, interval_rule
 from fat.tables import FaceDefTable
 from fba.arrays import Bools, Floats, Ints
 from fba.errors import FaceDefTablesError, FapStreamError
-from fba.faps import EXPRESSION_FAP, LOW_LEVEL_FAPS, VISEME_FAP, fap
+from fba.faps import EXPRESSION_FAP, FAP_COUNT, LOW_LEVEL_FAPS, VISEME_FAP, fap
 from fba.high_level import BLEND_MAX, expression_weights, viseme_weights
 from fba.scene import FaceScene
 from fba.stream import FapStream
@@ -63,7 +63,7 @@ class Player:
     Raises
     ------
     FaceDefTablesError
-        If a table speaks of a shape, vertex or Transform that is not there, or holds displacements that are
+        If a table speaks of a FAP, shape, vertex or Transform that is not there, or holds displacements that are
         not finite numbers.
 
     Notes
@@ -195,6 +195,8 @@ class _Plan:
         table_of: list[int] = []
         units: list[float] = []
         for number, table in enumerate(tables):
+            if not 1 <= table.fap_id <= FAP_COUNT:
+                raise FaceDefTablesError(f"fapID {table.fap_id} is not one of 1..{FAP_COUNT}")
             unit = face.fapu.unit(fap(table.fap_id).unit)
             for mesh in table.meshes:
                 check_indices(table, mesh, counts)

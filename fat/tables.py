@@ -10,7 +10,7 @@ import numpy as np
 
 from fba.arrays import Floats32, Ints, frozen
 from fba.errors import FaceDefTablesError
-from fba.faps import EXPRESSION_FAP, VISEME_FAP, fap
+from fba.faps import EXPRESSION_FAP, FAP_COUNT, VISEME_FAP, fap
 from fba.high_level import EXPRESSIONS, VISEMES
 
 
@@ -117,7 +117,7 @@ def table_name(fap_id: int, select: int = 1) -> str:
     if fap_id == EXPRESSION_FAP:
         known = 1 <= select <= len(EXPRESSIONS)
         return f"expression_{EXPRESSIONS[select - 1].name}" if known else f"expression_{select}"
-    return fap(fap_id).name
+    return fap(fap_id).name if 1 <= fap_id <= FAP_COUNT else f"fap_{fap_id}"
 
 
 @dataclass(frozen=True, eq=False)
