@@ -32,7 +32,7 @@ class Recipe:
     tied : further feature points that move by the same amount (inner and outer lip corner).
     carried : feature points that go along as they do in the units, in all axes.
     lid : side and part of the eyelid whose rim has to close on a line; None for every other FAP.
-    note : what a user should know.
+    note : what a user should know; "practical" = the jaw carries the lower lip, as most players expect.
     """
 
     fap: int
@@ -106,7 +106,7 @@ def _sided(k: int, side: str) -> list[Recipe]:
 RECIPES: tuple[Recipe, ...] = tuple(
     sorted(
         [
-            Recipe(3, (Border(1024, {"jawOpen": 1.0}),), carried=JAW, note="practical: the jaw carries the lower lip"),
+            Recipe(3, (Border(1024, {"jawOpen": 1.0}),), carried=JAW, note="practical"),
             Recipe(14, (Border(500, {"jawForward": 1.0}),), carried=JAW),
             Recipe(15, (Border(-300, {"jawLeft": 1.0}), Border(300, {"jawRight": 1.0})), carried=JAW),
             *_lips(),

@@ -43,7 +43,7 @@ def build_source(makehuman: MakeHuman) -> AnimatableFace:
     motions += high_level_motions(builder)
     scene, transforms = _rig(head)
     tables = build_tables(scene, head.fapu, motions, transforms)
-    notes = {"open_jaw": "practical"} | {table_name(r.fap): r.note for r in RECIPES if r.note}
+    notes = {table_name(r.fap): r.note for r in RECIPES if r.note}
     return AnimatableFace(scene, head.points, tables, head.fapu, notes)
 
 
