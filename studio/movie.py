@@ -160,17 +160,25 @@ def _timed(image: Image.Image, delay: int) -> Image.Image:
 def _shared_palette(frames: list[UInt8]) -> tuple[list[int], UInt8]:
     """Colours for all frames, and a table from 18-bit colours (6 bits a channel) to the nearest of them."""
     picks = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, PALETTE_FRAMES).astype(int))]
-    sample = Image.fromarray(np.concatenate(picks))
-    chosen = sample.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    codes, counts = np.unique(_six_bits(np.concatenate(picks)), return_counts=True)
+    colors = np.stack([codes >> 12, codes >> 6 & 63, codes & 63], axis=1).astype(np.uint8) * 4 + 2
+    # Rare colours (eyes, teeth) count by the square root: they matter more than their area says.
+    sample = np.repeat(colors, np.ceil(np.sqrt(counts)).astype(int), axis=0)
+    chosen = Image.fromarray(sample[None]).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     levels = np.arange(64, dtype=np.uint8) * 4 + 2
     grid = np.stack(np.meshgrid(levels, levels, levels, indexing="ij"), axis=-1).reshape(512, 512, 3)
     table = np.asarray(Image.fromarray(grid).quantize(palette=chosen, dither=Image.Dither.NONE)).ravel()
     return list(chosen.getpalette() or []), table
 
 
+def _six_bits(colors: UInt8) -> NDArray[np.int32]:
+    """Colours (..., 3) as 18-bit numbers."""
+    six = (colors >> 2).astype(np.int32)
+    return np.asarray((six[..., 0] << 12) | (six[..., 1] << 6) | six[..., 2])
+
+
 def _indexed(frame: UInt8, palette: list[int], table: UInt8) -> Image.Image:
-    six = (frame >> 2).astype(np.int32)
-    image = Image.fromarray(table[(six[..., 0] << 12) | (six[..., 1] << 6) | six[..., 2]], mode="P")
+    image = Image.frombytes("P", (frame.shape[1], frame.shape[0]), table[_six_bits(frame)].tobytes())
     image.putpalette(palette)
     return image
 

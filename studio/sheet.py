@@ -66,7 +66,7 @@ class Sheet:
         width = left + columns * (cell_w + GAP) - GAP + MARGIN
         width = max(width, int(fonts[TITLE_SIZE].getlength(self.title)) + 2 * MARGIN)
         top = MARGIN + (TITLE_SIZE + 2 * GAP if self.title else 0)
-        tops = []
+        tops: list[int] = []
         for row in self.rows:
             top += row.space_before if tops else 0
             tops.append(top)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,19 @@ class Decal:
     def __post_init__(self) -> None:
         object.__setattr__(self, "image", frozen(self.image, np.uint8))
         object.__setattr__(self, "uv", frozen(self.uv, np.float64, (-1, 3, 2)))
+
+    @cached_property
+    def touched(self) -> NDArray[np.bool_]:
+        """(t,) True for triangles in whose bounds some texel is not white."""
+        height, width = self.image.shape[:2]
+        sums = np.zeros((height + 1, width + 1), dtype=np.int64)
+        sums[1:, 1:] = np.cumsum(np.cumsum((self.image < 255).any(axis=2), axis=0), axis=1)
+        size = np.array([width, height])
+        low = np.clip(np.floor(self.uv.min(axis=1) * size), 0, size).astype(np.int64)
+        high = np.clip(np.floor(self.uv.max(axis=1) * size) + 1, 0, size).astype(np.int64)
+        (x0, y0), (x1, y1) = low.T, high.T
+        colored = sums[y1, x1] - sums[y0, x1] - sums[y1, x0] + sums[y0, x0]
+        return np.asarray((colored > 0) & (x1 > x0) & (y1 > y0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,6 +42,7 @@ LIMBUS = 0.82
 EDGE = 0.07
 """Softness of the iris's edges, in iris radii."""
 
+BYTES = np.uint32(0x00FF00FF)
 SIEVE = (0, 2, 3, 1)
 """The order in which a pixel's four samples (left to right, top to bottom) are set as opacity grows."""
 
@@ -157,13 +158,21 @@ def resolve(samples: UInt8) -> UInt8:
     (h, w, 3) uint8.
     """
     height, width = samples.shape[0] // SAMPLES, samples.shape[1] // SAMPLES
-    rows = samples.reshape(height, SAMPLES, 2 * width * 4).astype(np.uint16)
-    sums = rows[:, 0] + rows[:, 1]
-    sums = sums.reshape(height, width, SAMPLES, 4)
-    total = (sums[:, :, 0] + sums[:, :, 1]).astype(np.uint32)
-    empty = np.uint32(4 * 255) - total[..., 3:]
-    out = (total[..., :3] * np.uint32(255) + empty * background(height)[:, None] + np.uint32(510)) // np.uint32(1020)
-    return out.astype(np.uint8)
+    packed = np.ascontiguousarray(samples).view(np.uint32)[..., 0]
+    total = np.empty((height, width, 4), dtype=np.uint16)
+    # Two bytes of each colour at a time, each with room for the sum of four.
+    for k, half in enumerate((packed & BYTES, packed >> np.uint32(8) & BYTES)):
+        rows = half[0::2] + half[1::2]
+        total[..., k::2] = np.ascontiguousarray(rows[:, 0::2] + rows[:, 1::2]).view(np.uint16).reshape(height, width, 2)
+    out = ((total[..., :3] + np.uint16(2)) >> np.uint16(2)).astype(np.uint8)
+    alpha = total[..., 3]
+    backdrop = background(height)
+    np.copyto(out, backdrop[:, None].astype(np.uint8), where=(alpha == 0)[..., None])
+    row, column = np.nonzero((alpha > 0) & (alpha < 4 * 255))
+    part = total[row, column].astype(np.uint32)
+    blend = part[:, :3] * np.uint32(255) + (np.uint32(4 * 255) - part[:, 3:]) * backdrop[row]
+    out[row, column] = (blend + np.uint32(510)) // np.uint32(1020)
+    return out
 
 
 def background(height: int) -> NDArray[np.uint32]:

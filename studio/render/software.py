@@ -22,6 +22,8 @@ from studio.render.shading import SAMPLES, UInt8, encode, paint_iris, resolve, s
 EMPTY = np.iinfo(np.int64).max
 FORESHORTENED = 0.01
 """Relative difference of distance between a triangle's corners from which perspective is followed inside it."""
+FAR = 1e6
+"""Pixels; corners farther outside the picture are moved here where only whole pixels are wanted."""
 MIN_W = 1e-3
 """Triangles with a corner nearer to the lens than this fraction of its distance are left out."""
 
@@ -34,7 +36,7 @@ class SoftwareRenderer:
 
     def render(self, drawables: Sequence[Drawable], camera: Camera, width: int, height: int) -> UInt8:
         wide, high = width * SAMPLES, height * SAMPLES
-        samples = np.zeros((high * wide, 4), dtype=np.uint8)
+        samples = np.zeros(high * wide, dtype=np.uint32)
         drawables = [d for d in drawables if len(d.triangles)]
         if drawables:
             matrix = camera.clip_matrix(width, height, *depth_range(drawables, camera))
@@ -42,9 +44,10 @@ class SoftwareRenderer:
             corners, w = (np.concatenate([p[k] for p in placed]) for k in range(2))
             quarters = np.concatenate([np.full(len(d.triangles), round(4 * d.opacity)) for d in drawables])
             hit, triangle = nearest_triangles(corners, wide, high, quarters)
-            samples[hit, :3] = _colors(drawables, camera, corners, w, hit, triangle, wide)
-            samples[hit, 3] = 255
-        return resolve(samples.reshape(high, wide, 4))
+            colors = np.full((len(hit), 4), 255, dtype=np.uint8)
+            colors[:, :3] = _colors(drawables, camera, corners, w, hit, triangle, wide).T
+            samples[hit] = colors.view(np.uint32)[:, 0]
+        return resolve(samples.view(np.uint8).reshape(high, wide, 4))
 
 
 def _screen(drawable: Drawable, matrix: Floats, width: int, height: int) -> tuple[Floats, Floats]:
@@ -102,11 +105,10 @@ def depth_keys(
     packed[:, 1 - _LOW] = np.clip(depth + np.float32(2), np.float32(1), np.float32(3)).view(np.int32)
     key = packed.reshape(-1).view(np.int64)
     if quarters is not None and quarters.min(initial=4) < 4:
-        solid = quarters[span_triangle][span]
-        thin = np.flatnonzero(solid < 4)
-        kept = np.ones(total, dtype=bool)
-        kept[thin] = sieve(pixel[thin] % width, pixel[thin] // width, solid[thin])
-        key, pixel = key[kept], pixel[kept]
+        solid = quarters[span_triangle]
+        thin = np.flatnonzero(np.repeat(solid < 4, lengths))
+        kept = sieve(pixel[thin] % width, pixel[thin] // width, solid[span[thin]])
+        key[thin[~kept]] = EMPTY
     np.minimum.at(keys, pixel, key)
     return keys
 
@@ -131,22 +133,22 @@ def _spans(
     row = np.arange(len(owner)) - np.repeat(np.cumsum(rows) - rows, rows) + top[owner]
     center = row + 0.5
     # Edges are always walked from their upper end, so that both triangles at an edge find the same crossing.
-    slopes = [_slope(x, y, a, b)[owner] for a, b in ((0, 2), (0, 1), (1, 2))]
-    xs, ys = x[owner], y[owner]
-    long = xs[:, 0] + (center - ys[:, 0]) * slopes[0]
-    upper = xs[:, 0] + (center - ys[:, 0]) * slopes[1]
-    lower = xs[:, 1] + (center - ys[:, 1]) * slopes[2]
-    short = np.where(center < ys[:, 1], upper, lower)
+    slope, base = _crossings(x, y)
+    long = base[0][owner] + slope[0][owner] * center
+    edge = owner + len(rows) * np.where(center < y[:, 1][owner], 1, 2)
+    short = base.ravel()[edge] + slope.ravel()[edge] * center
     start = np.clip(np.ceil(np.minimum(long, short) - 0.5), 0, width).astype(np.int64)
     stop = np.clip(np.ceil(np.maximum(long, short) - 0.5), 0, width).astype(np.int64)
     full = stop > start
     return usable[owner[full]], row[full], start[full], stop[full]
 
 
-def _slope(x: Floats, y: Floats, a: int, b: int) -> Floats:
-    rise = y[:, b] - y[:, a]
-    slope: Floats = np.divide(x[:, b] - x[:, a], rise, out=np.zeros_like(rise), where=rise > 0)
-    return slope
+def _crossings(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Slope and base (3, t) of ``x = base + slope * y`` along the long, the upper and the lower edge."""
+    first, last = [0, 0, 1], [2, 1, 2]
+    rise = (y[:, last] - y[:, first]).T
+    slope = np.divide((x[:, last] - x[:, first]).T, rise, out=np.zeros_like(rise), where=rise > 0)
+    return np.ascontiguousarray(slope), x[:, first].T - y[:, first].T * slope
 
 
 def _depth_planes(corners: Floats) -> tuple[Floats, Floats, Floats]:
@@ -177,7 +179,7 @@ def _colors(
     triangle: Ints,
     width: int,
 ) -> UInt8:
-    """(p, 3) uint8 colours of the pixels that were hit."""
+    """(3, p) uint8 colours of the pixels that were hit."""
     directions = camera.rotation()
     table = np.concatenate([corner_attributes(d, directions) for d in drawables])
     first, second = _weights(corners, hit, triangle, width)
@@ -192,7 +194,7 @@ def _colors(
             mine = np.flatnonzero((triangle >= start) & (triangle < stop))
             _paint(drawable, mixed, mine, triangle[mine] - start, first[mine], second[mine])
         start = stop
-    return encode(shade(mixed, facing)).T
+    return encode(shade(mixed, facing))
 
 
 def _paint(
@@ -205,8 +207,7 @@ def _paint(
         mixed[3:6, mine] = paint_iris(mixed[3:6, mine], turned, drawable.iris.angle, drawable.iris.color)
     if drawable.decal is not None:
         uv = drawable.decal.uv.astype(np.float32)
-        touched = ((uv.max(axis=1) >= 0) & (uv.min(axis=1) <= 1)).all(axis=1)
-        some = np.flatnonzero(touched[triangle])
+        some = np.flatnonzero(drawable.decal.touched[triangle])
         u, v = _mix(uv, triangle[some], first[some], second[some])
         albedo = mixed[3:6, mine[some]]
         tint_by_decal(albedo, u, v, drawable.decal.image)
@@ -221,13 +222,25 @@ def _signed_area(corners: Floats) -> Floats:
 
 def _weights(corners: Floats, hit: NDArray[np.int64], triangle: Ints, width: int) -> tuple[Floats32, Floats32]:
     """Barycentric coordinates of corners 1 and 2 at the centres of the pixels."""
-    row, column = np.divmod(hit, width)
-    gradient = _gradients(corners).astype(np.float32)[triangle]
-    origin = corners[:, 0, :2][triangle]
-    dx = (column + 0.5 - origin[:, 0]).astype(np.float32)
-    dy = (row + 0.5 - origin[:, 1]).astype(np.float32)
-    first = np.clip(gradient[:, 0] * dx + gradient[:, 1] * dy, 0, 1)
-    second = np.clip(gradient[:, 2] * dx + gradient[:, 3] * dy, 0, 1)
+    place = hit.astype(np.int32)
+    row = place // np.int32(width)
+    column = place - row * np.int32(width)
+    # Places relative to a whole pixel beside the corner keep single precision exact enough.
+    gradient = _gradients(corners)
+    finite = np.nan_to_num(corners[:, 0, :2])
+    origin = np.floor(np.clip(finite, -FAR, FAR))
+    offset = origin + 0.5 - finite
+    near_x, near_y = np.ascontiguousarray(origin.T).astype(np.int32)
+    dx, dy = (column - near_x[triangle]).astype(np.float32), (row - near_y[triangle]).astype(np.float32)
+    weights = []
+    for k in (0, 2):
+        level = gradient[:, k] * offset[:, 0] + gradient[:, k + 1] * offset[:, 1]
+        planes = [np.nan_to_num(p).astype(np.float32) for p in (gradient[:, k], gradient[:, k + 1], level)]
+        weight = planes[2][triangle]
+        weight += planes[0][triangle] * dx
+        weight += planes[1][triangle] * dy
+        weights.append(np.clip(weight, 0, 1, out=weight))
+    first, second = weights
     return first, second
 
 
