@@ -37,10 +37,10 @@ def _imports(path: Path) -> tuple[set[str], set[str]]:
             loading = False
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = [a.name for a in node.names]
-            found = names if isinstance(node, ast.Import) else [node.module or ""]
             if isinstance(node, ast.ImportFrom):
-                found += [f"{node.module}.{n}" for n in names]
-            own = {f for f in found if f in MODULES}
+                # "from package import module" needs the module, not what the package's face re-exports.
+                names = [n if (n := f"{node.module}.{a}") in MODULES else node.module or "" for a in names]
+            own = {n for n in names if n in MODULES}
             every.update(own)
             if loading:
                 at_load.update(own)
