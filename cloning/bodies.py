@@ -97,7 +97,7 @@ def teeth_mover(source: PreparedFace, target: PreparedFace, mine: Body, yours: B
 
 
 def eye_mover(source: PreparedFace, target: PreparedFace, mine: Body, yours: Body, role: Role) -> Mover:
-    """Eyeballs: rotation and translation as they are, and what is not rigid (a pupil's dilation) by place on the ball."""
+    """Eyeballs: rotation and translation as they are; what is not rigid (a pupil's dilation) by place on the ball."""
     pupil = next(key for key, r in PUPILS.items() if r is role)
     center_s = eye_center(mine.vertices, source.place(pupil))
     center_t = eye_center(yours.vertices, target.place(pupil))
@@ -152,7 +152,8 @@ def tongue_mover(
             out[follows] = teeth[tooth[follows]]
         flat = out.reshape(len(out), -1)
         fill.apply(flat)
-        return flat.reshape(out.shape)
+        filled: Floats = flat.reshape(out.shape)
+        return filled
 
     return move
 
@@ -182,7 +183,7 @@ def _to_body(of: Body, other: Body | None, es0: float) -> tuple[Floats, Ints]:
     if other is None:
         return np.full(len(of.vertices), np.inf), np.zeros(len(of.vertices), np.int32)
     distances, nearest = cKDTree(other.vertices).query(of.vertices)
-    return distances / es0, nearest.astype(np.int32)
+    return np.asarray(distances) / es0, np.asarray(nearest, dtype=np.int32)
 
 
 def _middle(face: PreparedFace, joined: Body, ids: Sequence[str]) -> Floats:

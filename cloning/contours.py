@@ -104,9 +104,7 @@ def _path(graph: object, places: Ints, surface: Surface, a: str, b: str) -> Floa
     return line
 
 
-def _divide(
-    line: Floats | None, positions: Mapping[str, Floats], a: str, b: str, count: int
-) -> list[Floats]:
+def _divide(line: Floats | None, positions: Mapping[str, Floats], a: str, b: str, count: int) -> list[Floats]:
     if line is None or len(line) < 2:
         return []
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)

@@ -79,7 +79,6 @@ class Correction:
         after = goals - (self.evaluate @ motion.reshape(len(motion), -1)).reshape(k, count, 3)
         return before, after
 
-
     def _activity(self, motion: Floats, goals: Floats) -> Floats:
         """(n, K) 0 where the skin rests and may not be moved, up to 1 where it moves or a feature point must."""
         size = np.linalg.norm(motion, axis=2)

@@ -16,6 +16,7 @@ from cloning.align import anchor_ids
 from cloning.backends import SkinTransfer
 from cloning.normalize import blend, ratios
 from cloning.prepare import PreparedFace
+from cloning.published import build_published
 from cloning.skin import FARTHEST, LEAST_FACING, SkinMap, build_skin_map
 from fba.arrays import Floats
 
@@ -35,8 +36,6 @@ class AlignedTransfer:
 def build_transfer(source: PreparedFace, target: PreparedFace, as_published: bool) -> SkinTransfer:
     """Prepare Facial Motion Cloning between two faces."""
     if as_published:
-        from cloning.published import build_published
-
         return build_published(source, target)
     ids = anchor_ids(source.skin, target.skin)
     anchors = np.array([target.skin.positions[i] for i in ids])

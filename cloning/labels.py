@@ -8,6 +8,7 @@ warped across two opposite labels.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -103,8 +104,8 @@ def _cut(surface: Surface, width: float) -> tuple[Bools, Floats]:
     edges = surface.edges
     lengths = np.linalg.norm(surface.vertices[edges[:, 0]] - surface.vertices[edges[:, 1]], axis=1)
     graph = symmetric_graph(edges, lengths, surface.vertex_count)
-    for start, end in zip(stops, stops[1:], strict=False):
-        _, before = dijkstra(graph, indices=start, return_predecessors=True)
+    for start, end in pairwise(stops):
+        before = dijkstra(graph, indices=np.array([start]), return_predecessors=True)[1][0]
         step = end
         while step >= 0:
             on_path[step] = True

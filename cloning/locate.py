@@ -59,9 +59,11 @@ def closest(
         mask = np.ones(len(triangles), bool) if usable is None else usable.copy()
         if number and OPPOSITE[number] >= 0:
             mask &= ~np.any(corner_labels == OPPOSITE[number], axis=1)
-        here = np.flatnonzero(labels == number)
+        here = np.flatnonzero(labels == number).astype(np.int32)
         if mask.any():
-            _search(points, normals, here, vertices, vertex_normals, triangles, np.flatnonzero(mask), found)
+            _search(
+                points, normals, here, vertices, vertex_normals, triangles, np.flatnonzero(mask).astype(np.int32), found
+            )
     return found
 
 

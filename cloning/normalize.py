@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fba.arrays import Floats
+from fba.arrays import Floats, Ints
 from fba.faps import Unit
 from fba.fapu import Fapu
 
@@ -74,9 +74,8 @@ def blend(places: Floats, anchors: Floats, values: Floats, power: float = 3.0) -
     return out
 
 
-def nearest(places: Floats, anchors: Floats) -> Floats:
+def nearest(places: Floats, anchors: Floats) -> Ints:
     """Index of the nearest anchor of each place, (n,)."""
     from scipy.spatial import cKDTree
 
-    found: Floats = cKDTree(anchors).query(places)[1]
-    return found
+    return np.asarray(cKDTree(anchors).query(places)[1], dtype=np.int32)

@@ -109,11 +109,9 @@ def eye_center(vertices: Floats, pupil: Floats | None) -> Floats:
     """
     center, radius, error = fit_sphere(vertices)
     half = 0.5 * float(np.max(vertices.max(axis=0) - vertices.min(axis=0)))
-    if error > 0.15 * radius or radius > 2.0 * half or radius < 0.5 * half:
+    far = pupil is not None and float(np.linalg.norm(pupil - center)) > 2.5 * radius
+    if far or error > 0.15 * radius or radius > 2.0 * half or radius < 0.5 * half:
         middle: Floats = 0.5 * (vertices.max(axis=0) + vertices.min(axis=0))
-        return middle
-    if pupil is not None and np.linalg.norm(pupil - center) > 2.5 * radius:
-        middle = 0.5 * (vertices.max(axis=0) + vertices.min(axis=0))
         return middle
     return center
 

@@ -50,7 +50,7 @@ def refine(indices: Ints, offsets: Ints, n: int) -> Refinement:
 
     m, k = len(offsets) - 1, len(indices)
     arity = np.diff(offsets)
-    face_of = np.repeat(np.arange(m), arity)
+    face_of = np.repeat(np.arange(m, dtype=np.int32), arity)
     following = np.arange(k) + 1
     following[offsets[1:] - 1] = offsets[:-1]
     pairs = np.sort(np.stack([indices, indices[following]], axis=1), axis=1)

@@ -41,7 +41,8 @@ class RigidMotion:
         """
         local = vertices - center
         turned = np.einsum("kij,nj->nki", self.turns - np.eye(3), local)
-        return turned + (self.shifts * ratio)[None]
+        moved: Floats = turned + (self.shifts * ratio)[None]
+        return moved
 
 
 def fit_rigid(vertices: Floats, offsets: Floats, center: Floats) -> RigidMotion:

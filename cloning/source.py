@@ -9,15 +9,17 @@ from fat.evaluate import Player
 from fat.face import AnimatableFace
 from fat.motion import FaceMotion
 from fat.rig import EYE_FAPS, HEAD_FAPS
-from fba.faps import fap
+from fba.arrays import Floats
+from fba.faps import EXPRESSION_FAP, VISEME_FAP, fap
+from fba.high_level import BLEND_MAX
 
 Key = tuple[int, int]
 
 TURNING: frozenset[Key] = frozenset((n, 1) for rows in (*EYE_FAPS.values(), HEAD_FAPS) for _, n in rows)
 """FAPs that turn eyeballs and head: carried by transforms, never by vertices."""
 
-HIGH_LEVEL_VALUE = 63
 LOW_LEVEL_VALUE = 512
+"""FAP value at which a table without meshes is played."""
 
 
 def turning_keys(source: AnimatableFace) -> frozenset[Key]:
@@ -44,10 +46,10 @@ def source_motions(source: AnimatableFace, faps: frozenset[int] | None = None) -
         rest = {s.name: source.scene.world_vertices(s.name) for s in source.scene.shapes}
         for table in played:
             borders = {int(b) for m in table.meshes for b in m.interval_borders} - {0}
-            high = table.fap_id <= 2
-            values = sorted(borders) or ([HIGH_LEVEL_VALUE] if high else _values(table.fap_id))
+            high = table.fap_id <= EXPRESSION_FAP
+            values = sorted(borders) or ([BLEND_MAX] if high else _values(table.fap_id))
             for value in values:
-                pose = player.pose(**_call(table.key, value)).world_shapes()
+                pose = _pose(player, table.key, value)
                 offsets = {n: v - rest[n] for n, v in pose.items() if np.any(v != rest[n])}
                 motions.append(FaceMotion(table.name, *table.key, value, offsets))
     return sorted(motions, key=lambda m: (m.fap_id or 0, m.select, m.value))
@@ -57,9 +59,9 @@ def _values(number: int) -> list[int]:
     return [-LOW_LEVEL_VALUE, LOW_LEVEL_VALUE] if fap(number).bidirectional else [LOW_LEVEL_VALUE]
 
 
-def _call(key: Key, value: int) -> dict[str, object]:
-    if key[0] == 1:
-        return {"viseme": (key[1], 0, value)}
-    if key[0] == 2:
-        return {"expression": (key[1], value, 0, 0)}
-    return {"faps": {key[0]: value}}
+def _pose(player: Player, key: Key, value: int) -> dict[str, Floats]:
+    if key[0] == VISEME_FAP:
+        return player.pose(viseme=(key[1], 0, value)).world_shapes()
+    if key[0] == EXPRESSION_FAP:
+        return player.pose(expression=(key[1], value, 0, 0)).world_shapes()
+    return player.pose({key[0]: value}).world_shapes()

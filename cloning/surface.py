@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,7 @@ class Surface:
     @cached_property
     def seam_mean(self) -> Any:
         """(n, n) sparse: the mean over the copies of a vertex along a seam; the identity elsewhere."""
-        from scipy.sparse import coo_array, csr_array
+        from scipy.sparse import coo_array, csr_array, diags_array
         from scipy.sparse.csgraph import connected_components
 
         n = self.vertex_count
@@ -88,7 +89,7 @@ class Surface:
         _, group = connected_components(pairs, directed=False)
         sums = csr_array((np.ones(n), (group, np.arange(n))))
         counts = np.bincount(group)
-        return (sums.T @ (sums.multiply(1.0 / counts[:, None]))).tocsr()
+        return sums.T @ (diags_array(1.0 / counts) @ sums)
 
     @cached_property
     def graph(self) -> Any:
@@ -252,7 +253,8 @@ def _seams(vertices: Floats, indices: Ints, offsets: Ints, positions: Mapping[st
     near = _distance_to_lines(vertices[links[:, 0]], positions) < 0.02
     component = _components(indices, offsets, len(vertices))
     same = component[links[:, 0]] == component[links[:, 1]]
-    return links[~(near & same)]
+    kept: Ints = links[~(near & same)]
+    return kept
 
 
 def seam_links(vertices: Floats, indices: Ints, offsets: Ints, tolerance: float = 1e-6) -> Ints:
@@ -283,7 +285,7 @@ def _components(indices: Ints, offsets: Ints, n: int) -> Ints:
 def _distance_to_lines(places: Floats, positions: Mapping[str, Floats]) -> Floats:
     best = np.full(len(places), np.inf)
     for line in _LIP_AND_LID_LINES:
-        for a, b in zip(line, line[1:], strict=False):
+        for a, b in pairwise(line):
             if a not in positions or b not in positions:
                 continue
             start, step = positions[a], positions[b] - positions[a]

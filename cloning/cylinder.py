@@ -1,0 +1,44 @@
+"""Cylindrical projection of a normalized face (Facial Motion Cloning, section "Aligning source and target face")."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fba.arrays import Floats
+
+MOUTH_HALF_ANGLE = 0.5
+"""Half of the mouth's constant angular width, radians; the paper fixes that it is constant, not its value."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """Where the axis lies and which angle is zero.
+
+    Attributes
+    ----------
+    x, z : position of the vertical axis.
+    zero : angle of the nose tip.
+    """
+
+    x: float
+    z: float
+    zero: float
+
+    def project(self, places: Floats) -> tuple[Floats, Floats]:
+        """(n, 3) places to (n, 2) angle and height, and (n,) depth measured from outside."""
+        x, z = places[:, 0] - self.x, places[:, 2] - self.z
+        angle = np.arctan2(x, z) - self.zero
+        angle = np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi
+        return np.stack([angle, places[:, 1]], axis=1), -np.hypot(x, z)
+
+
+def cylinder(positions: Mapping[str, Floats]) -> Cylinder:
+    """The cylinder in which the mouth corners 8.3 and 8.4 span a constant angle and 9.3 is at angle zero."""
+    left, right, tip = positions["8.3"], positions["8.4"], positions["9.3"]
+    half = 0.5 * abs(float(left[0] - right[0]))
+    x = 0.5 * float(left[0] + right[0])
+    z = 0.5 * float(left[2] + right[2]) - half / np.tan(MOUTH_HALF_ANGLE)
+    return Cylinder(x, float(z), float(np.arctan2(tip[0] - x, tip[2] - z)))
