@@ -207,22 +207,33 @@ def _write_mp4(frames: Iterator[UInt8], fps: float, path: Path) -> Animation:
         command += ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart", str(temporary)]
         count = 0
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log) as process:
-            assert process.stdin is not None
             try:
                 for frame in chain([first], frames):
-                    process.stdin.write(_even(frame).tobytes())
+                    _feed(process, _even(frame).tobytes())
                     count += 1
-                process.stdin.close()
-            except BrokenPipeError:
-                pass
+                _feed(process, None)
             except BaseException:
                 process.kill()
+                _feed(process, None)
                 raise
         if process.returncode != 0:
             log.seek(0)
             reason = log.read().decode(errors="replace").strip().splitlines()[-1:] or ["no message"]
             raise OutputFileError(f"cannot write {path}: ffmpeg failed: {reason[0]}")
     return Animation(path, count, float(rate))
+
+
+def _feed(process: subprocess.Popen[bytes], data: bytes | None) -> None:
+    """Hand bytes to a program, or (None) end its input; one that has died says why by its exit code and log."""
+    if process.stdin is None:
+        return
+    try:
+        if data is None:
+            process.stdin.close()
+        else:
+            process.stdin.write(data)
+    except BrokenPipeError:
+        process.stdin = None
 
 
 def _even(frame: UInt8) -> UInt8:
