@@ -12,6 +12,7 @@ from fba.closest import TriangleSearch
 from fba.errors import LandmarkError, MeshError
 from fba.feature_points import FeaturePoint
 from fba.scene import FaceScene, Role
+from formats.mesh_document import MeshDocument
 
 SNAP_LIMIT = 0.02
 """A position farther from every surface than this part of the scene's diagonal belongs to another mesh."""
@@ -48,10 +49,7 @@ class Surfaces:
     @cached_property
     def _file_polygons(self) -> tuple[Ints, Ints] | None:
         document = self.scene.document
-        indices, offsets = getattr(document, "indices", None), getattr(document, "offsets", None)
-        if isinstance(indices, np.ndarray) and isinstance(offsets, np.ndarray):
-            return indices, offsets
-        return None
+        return (document.indices, document.offsets) if isinstance(document, MeshDocument) else None
 
     @cached_property
     def _diagonal(self) -> float:

@@ -17,6 +17,7 @@ from fba.errors import InputFileError, MeshError
 from fba.mesh import Material, PolyMesh
 from fba.scene import FaceScene, Shape
 from formats.files import read_bytes
+from formats.mesh_document import MeshDocument
 from formats.mtl import find_materials
 from formats.names import unique_names
 from formats.obj_writer import write_obj
@@ -31,22 +32,17 @@ _IGNORED = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves"
 
 
 @dataclass(frozen=True, eq=False)
-class ObjDocument:
+class ObjDocument(MeshDocument):
     """What an OBJ file held besides the shapes.
 
     Attributes
     ----------
-    indices, offsets : the polygons in the file's own order and vertex numbers (see `PolyMesh`).
     objects : names of the shapes that are objects of the file (``o``).
     colors : (N, k) float64 per-vertex values behind the position, or None.
-    remarks : what was skipped or missing, in plain words.
     """
 
-    indices: Ints
-    offsets: Ints
     objects: tuple[str, ...] = ()
     colors: Floats | None = None
-    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +111,7 @@ def read(path: Path) -> FaceScene:
     mesh, own = _mesh(vertices, texcoords, normals, polygons, groups, objects, materials, known)
     shapes = _split(mesh, own, objects, polygons, np.flatnonzero(is_vertex))
     named = tuple(s.name for s in shapes) if len(shapes) > 1 or objects.names else ()
-    document = ObjDocument(mesh.indices, mesh.offsets, named, colors, tuple(remarks))
+    document = ObjDocument(mesh.indices, mesh.offsets, tuple(remarks), named, colors)
     return FaceScene(shapes, name=path.stem, document=document)
 
 
