@@ -24,6 +24,8 @@ INK = (32, 33, 36)
 GREY = (110, 113, 120)
 MARGIN = 14
 GAP = 6
+TALL = 1.2
+"""Height of a face's picture in widths."""
 TITLE_SIZE, LABEL_SIZE, CAPTION_SIZE = 22, 15, 13
 
 
@@ -134,9 +136,9 @@ FAP_POSES: tuple[PosePick, ...] = (
     PosePick("wink left", {19: 1024}),
     PosePick("eyes to the left", {23: 40000, 24: 40000}),
     PosePick("eyes up", {25: -25000, 26: -25000}),
-    PosePick("brows raised", {31: 180, 32: 180, 33: 200, 34: 200, 35: 160, 36: 160}),
-    PosePick("brows squeezed", {31: -80, 32: -80, 37: 90, 38: 90}),
-    PosePick("smile", {6: 180, 7: 180, 12: 260, 13: 260}),
+    PosePick("brows raised", {31: 120, 32: 120, 33: 140, 34: 140, 35: 100, 36: 100}),
+    PosePick("brows squeezed", {31: -100, 32: -100, 33: -60, 34: -60, 37: 120, 38: 120}),
+    PosePick("smile", {6: 180, 7: 180, 12: 400, 13: 400}),
     PosePick("lips pushed", {16: 300, 17: 300, 53: -120, 54: -120}),
     PosePick("cheeks puffed", {39: 200, 40: 200}),
     PosePick("jaw to the left", {15: 150}),
@@ -181,7 +183,7 @@ def contact_sheet(
     Parameters
     ----------
     poses : None takes `default_poses` of both.
-    cell : width and height of one picture, pixels.
+    cell : width of one picture, pixels; its height is 1.2 times as much.
     columns : poses in one band.
     yaw : degrees by which the camera walks to the subject's left.
 
@@ -207,5 +209,5 @@ def _draw_poses(player: Player, picks: Sequence[PosePick], cell: int, yaw: float
     out = []
     for pick in picks:
         pose = player.pose(pick.faps, pick.viseme, pick.expression)
-        out.append(figure.draw(pose.world_shapes(), (cell, cell), camera, renderer))
+        out.append(figure.draw(pose.world_shapes(), (cell, round(TALL * cell)), camera, renderer))
     return out
