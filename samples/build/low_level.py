@@ -73,7 +73,7 @@ def _lips() -> list[Recipe]:
     upper, lower = _CONTOUR
     return [
         *(Recipe(fap, (Border(-300, _UPPER_LIP_UP, (key,)),)) for fap, key in upper),
-        *(Recipe(fap, (Border(-300, _LOWER_LIP_DOWN, (key,)),)) for fap, key in lower),
+        *(Recipe(fap, (Border(-300, _LOWER_LIP_DOWN, (key,), axes="y"),)) for fap, key in lower),
         Recipe(16, (Border(500, {"mouthPucker": 1.0}, ("lower", "mouth")),)),
         Recipe(17, (Border(-400, {"mouthRollUpper": 1.0}), Border(500, {"mouthFunnel": 1.0}, ("upper", "mouth")))),
     ]

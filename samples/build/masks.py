@@ -17,11 +17,20 @@ from samples.build.head import Head
 HALF_WIDTH = 0.12
 """Width (ES0) of the blend between the halves of the forehead and the mouth."""
 
+LINING = (0.4, 1.6)
+"""Behind the contact line (in lip thicknesses) the lining of the mouth goes along up to the first, not beyond the
+second."""
+
 CONTOURS = {
     "upper": (("2.7", "2.2", "2.6"), ("8.6", "8.1", "8.5")),
     "lower": (("2.9", "2.3", "2.8"), ("8.8", "8.2", "8.7")),
 }
 """Lip -> inner and outer contour points (right, middle, left)."""
+CURVES = {
+    "upper": (("2.5", "2.7", "2.2", "2.6", "2.4"), ("8.4", "8.6", "8.9", "8.1", "8.10", "8.5", "8.3")),
+    "lower": (("2.5", "2.9", "2.3", "2.8", "2.4"), ("8.4", "8.8", "8.2", "8.7", "8.3")),
+}
+"""Lip -> all points along its inner and its outer contour, corners included."""
 BROWS = {"left": ("4.1", "4.3", "4.5"), "right": ("4.2", "4.4", "4.6")}
 
 
@@ -86,9 +95,14 @@ class Masks:
         knots = [p[k][0] for k in (ends[0], *CONTOURS[lip][row], ends[1])]
         along = _hat(self._skin[:, 0], knots, place + 1)
         inner = self._inner_share(lip)
-        across = inner if row == 0 else (1.0 - inner) * self._toward_face(lip)
+        across = inner if row == 0 else (1.0 - inner) * self._toward_face(lip) * self._in_front(lip)
         share: Floats = along * across * self._lips[lip]
         return share
+
+    def _in_front(self, lip: str) -> Floats:
+        """1 outside the mouth, 0 behind the contact line."""
+        inner, outer, thick = self.lip_distances(lip)
+        return 1.0 - smoothstep((outer - inner) / thick)
 
     def _toward_face(self, lip: str) -> Floats:
         """1 on the outer contour, 0 at the height of the chin's boss (lower lip) or of the nose (upper lip)."""
@@ -103,22 +117,30 @@ class Masks:
         return 1.0 - smoothstep((np.abs(self._skin[:, 0]) - width) / width)
 
     def _inner_share(self, lip: str) -> Floats:
-        """1 on the inner contour and behind it, 0 on the outer contour and beyond."""
-        inner, outer = (self._contour_distance(row, ends) for row, ends in zip(CONTOURS[lip], ENDS, strict=True))
-        p = self.head.positions
-        width = [float(np.linalg.norm(p[a] - p[b])) for a, b in zip(*CONTOURS[lip], strict=True)]
-        x = [p[k][0] for k in CONTOURS[lip][0]]
-        thick = np.interp(self._skin[:, 0], [p["8.4"][0], *x, p["8.3"][0]], [0.3 * width[0], *width, 0.3 * width[2]])
-        return smoothstep(0.5 + 0.5 * (outer - inner) / thick)
+        """1 on the inner contour and just behind it, 0 deep in the mouth, on the outer contour and beyond."""
+        inner, outer, thick = self.lip_distances(lip)
+        behind = np.where(outer > thick, inner / thick, 0.0)
+        deep = smoothstep((behind - LINING[0]) / (LINING[1] - LINING[0]))
+        share: Floats = smoothstep(0.5 + 0.5 * (outer - inner) / thick) * (1.0 - deep)
+        return share
 
-    def _contour_distance(self, row: Sequence[str], ends: Sequence[str]) -> Floats:
-        """Geodesic distance to the vertices next to the curve through a row of contour points."""
+    def lip_distances(self, lip: str) -> tuple[Floats, Floats, Floats]:
+        """Distance (n,) of the skin to a lip's inner and outer contour, and the lip's thickness at its x."""
+        rows = CONTOURS[lip]
+        inner, outer = (self._contour_distance(lip, keys) for keys in CURVES[lip])
         p = self.head.positions
-        curve = np.array([p[k] for k in (ends[0], *row, ends[1])])
-        x = np.linspace(curve[0, 0], curve[-1, 0], 25)
+        width = [float(np.linalg.norm(p[a] - p[b])) for a, b in zip(*rows, strict=True)]
+        x = [p["8.4"][0], *(p[k][0] for k in rows[0]), p["8.3"][0]]
+        thick: Floats = np.interp(self._skin[:, 0], x, [0.3 * width[0], *width, 0.3 * width[2]])
+        return inner, outer, thick
+
+    def _contour_distance(self, lip: str, keys: Sequence[str]) -> Floats:
+        """Geodesic distance to the vertices next to the curve through contour points."""
+        p = self.head.positions
+        curve = np.array([p[k] for k in keys])
+        x = np.linspace(curve[0, 0], curve[-1, 0], 41)
         line = np.column_stack([x, *(_through(x, curve[:, 0], curve[:, k]) for k in (1, 2))])
-        side = self._lips["upper" if row in CONTOURS["upper"] else "lower"] > 0.5
-        ids = np.flatnonzero(side)
+        ids = np.flatnonzero(self._lips[lip] > 0.5)
         away = np.linalg.norm(self._skin[ids][None] - line[:, None], axis=2)
         seeds = [FeaturePoint("skin", (int(ids[k]),), (1.0,)) for k in np.unique(np.argmin(away, axis=1))]
         nearest: Floats = distances(self.head.scene.shape("skin").mesh, seeds).min(axis=0)

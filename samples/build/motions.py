@@ -14,11 +14,12 @@ from fat.tables import table_name
 from fba.arrays import Floats
 from fba.faps import fap
 from samples.build.correction import Correction, PointAxis
+from samples.build.geodesic import smoothstep
 from samples.build.head import Head
 from samples.build.lids import Lid
 from samples.build.low_level import Border, Recipe
 from samples.build.masks import Masks
-from samples.build.neutral import lash_roots
+from samples.build.neutral import PASSES, close_lips, lash_roots
 
 Offsets = dict[str, Floats]
 
@@ -37,7 +38,8 @@ class MotionBuilder:
         """Weighted sum of units: shape -> (n, 3). The upper teeth stay (mouthFunnel bends a few of them)."""
         total: Offsets = {}
         for name, weight in units.items():
-            for shape, offsets in self.head.unit(name).items():
+            unit = self._tongue_up if name == TONGUE_UP else self.head.unit(name)
+            for shape, offsets in unit.items():
                 if shape == "upper_teeth":
                     continue
                 total[shape] = total.get(shape, 0.0) + weight * offsets
@@ -98,6 +100,30 @@ class MotionBuilder:
         roots = lash_roots(self.head)
         return {name: np.asarray(tree.query(self.head.parts[name][rows])[1]) for name, rows in roots.items()}
 
+    def over_eyeballs(self, offsets: Offsets) -> Offsets:
+        """The offsets with the lids kept off the eyeballs."""
+        skin = offsets["skin"]
+        for side in ("left", "right"):
+            skin = Lid(self.head, side, "upper").over_eyeball(skin)
+        return self._with_skin(offsets, skin)
+
+    def with_closed_lips(self, offsets: Offsets) -> Offsets:
+        """The offsets with whatever gap is left between the lips closed."""
+        skin = offsets["skin"]
+        for _ in range(PASSES):
+            skin = skin + close_lips(self.head, skin)
+        return self._with_skin(offsets, skin)
+
+    @cached_property
+    def _tongue_up(self) -> Offsets:
+        """The front of the tongue bends up and back until its tip is behind the upper teeth; no face unit does it."""
+        p = self.head.positions
+        tongue = self.head.parts["tongue"]
+        middle, tip = p["6.2"][2], p["6.1"][2]
+        share = smoothstep((tongue[:, 2] - middle) / (tip - middle)) ** 2
+        lift = np.array([0.0, TIP_LIFT, -0.5 * TIP_LIFT]) * self.head.fapu.es0
+        return {"tongue": share[:, None] * lift}
+
     def _masked(self, offsets: Offsets, names: Sequence[str]) -> Offsets:
         """Only the skin's share under the product of these masks; everything, if there are none."""
         if not names:
@@ -110,6 +136,10 @@ class MotionBuilder:
         return Masks(self.head)
 
 
+TONGUE_UP = "tongueUp"
+"""Name of a pose's own unit beside MakeHuman's."""
+TIP_LIFT = 0.2
+"""Height of the tongue's tip in that unit, in ES0."""
 LID_STEP = 256
 """Between the borders of a closing lid: the chord of each step stays within 0.4 % of the eyeball's radius."""
 NOISE = 3e-4

@@ -34,7 +34,7 @@ def neutral(head: Head) -> Head:
     """Return the head with lids tangent to the iris, lips closed on a level line, and teeth and tongue in place."""
     head = _lids(replace(head, placed=_lid_points(head)))
     for _ in range(PASSES):
-        head = head.moved({"skin": _lip_offsets(head)})
+        head = head.moved({"skin": close_lips(head)})
     head = replace(head, placed={**head.placed, **_lip_points(head)})
     return _lashes(_teeth(head))
 
@@ -73,17 +73,30 @@ def _move(head: Head, key: str, skin_offsets: Floats) -> Floats:
     return moved
 
 
-def _lip_offsets(head: Head) -> Floats:
-    """Offsets (n, 3) of the skin that bring both lips to a level line at the height of the corners."""
+def close_lips(head: Head, motion: Floats | None = None) -> Floats:
+    """Offsets (n, 3) of the skin that bring both lips together.
+
+    Parameters
+    ----------
+    motion : (n, 3) offsets of a pose whose lips shall meet half-way where a gap is left; None = the neutral face,
+        whose lips meet on a level line at the height of the corners.
+    """
     p, fapu = head.positions, head.fapu
-    skin = head.parts["skin"]
-    level = 0.5 * (p["2.4"][1] + p["2.5"][1])
-    span = np.linspace(p["2.5"][0], p["2.4"][0], 161)[1:-1]
+    skin = head.parts["skin"] if motion is None else head.parts["skin"] + motion
+    ends = [head.points[k].vertices[0] for k in ("2.5", "2.4")]
+    span = np.linspace(skin[ends[0], 0], skin[ends[1], 0], 161)[1:-1]
+    sides = {name: side_mask(head, edge) for name, edge in LIPS.items()}
+    lines = {name: edge_line(head, edge, sides[name], span, motion).points for name, edge in LIPS.items()}
+    level = np.full(span.size, 0.5 * (p["2.4"][1] + p["2.5"][1]))
+    gap = lines["upper"][:, 1] - lines["lower"][:, 1]
+    if motion is not None:
+        level = 0.5 * (lines["upper"][:, 1] + lines["lower"][:, 1])
     offsets = np.zeros_like(skin)
-    for edge in LIPS.values():
-        side = side_mask(head, edge)
-        line = edge_line(head, edge, side, span).points
+    for name, edge in LIPS.items():
+        side, line = sides[name], lines[name]
         shift = level + edge.sign * 0.5 * LIP_GAP * fapu.mns0 - line[:, 1]
+        if motion is not None:
+            shift = np.where(gap > LIP_GAP * fapu.mns0, shift, 0.0)
         x = skin[side, 0]
         place = np.column_stack([np.interp(x, span, line[:, k]) for k in (1, 2)])
         away = np.linalg.norm(skin[side, 1:] - place, axis=1) / (LIP_REACH * fapu.es0)

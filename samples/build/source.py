@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fat.build import build_tables
@@ -11,6 +13,7 @@ from fat.rig import RigTables, rig_eye, rig_head
 from fat.tables import table_name
 from fba.fapu import FAPU_DIVISOR
 from fba.scene import FaceScene
+from samples.build.colors import skin_materials
 from samples.build.head import Head, build_head, macro
 from samples.build.high_level import high_level_motions
 from samples.build.low_level import RECIPES
@@ -41,7 +44,7 @@ def build_source(makehuman: MakeHuman) -> AnimatableFace:
     motions = [motion for recipe in RECIPES for motion in builder.fap_motions(recipe)]
     motions += eye_thrusts(head)
     motions += high_level_motions(builder)
-    scene, transforms = _rig(head)
+    scene, transforms = _rig(head, colored(head))
     tables = build_tables(scene, head.fapu, motions, transforms)
     notes = {table_name(r.fap): r.note for r in RECIPES if r.note}
     return AnimatableFace(scene, head.points, tables, head.fapu, notes)
@@ -57,8 +60,14 @@ def eye_thrusts(head: Head) -> list[FaceMotion]:
     return out
 
 
-def _rig(head: Head) -> tuple[FaceScene, RigTables]:
-    scene = head.scene
+def colored(head: Head) -> FaceScene:
+    """The head's scene with lips and mouth in their own colours."""
+    skin = head.scene.shape("skin")
+    mesh = replace(skin.mesh, face_materials=skin_materials(head))
+    return head.scene.map_shapes({"skin": replace(skin, mesh=mesh)})
+
+
+def _rig(head: Head, scene: FaceScene) -> tuple[FaceScene, RigTables]:
     tables: RigTables = {}
     for side in ("left", "right"):
         name = f"eye_{side}"
