@@ -107,3 +107,48 @@ def small_face(frame: Frame | None = None) -> AnimatableFace:
         Fapu(0.2, 0.8, 0.7, 0.3, 0.9),
         {"open_jaw": "practical", "made by": "hand"},
     )
+
+
+def assert_same_scene(found: FaceScene, wanted: FaceScene) -> None:
+    """Every node, mesh, material and frame is the same; the scenes' names and documents may differ."""
+    assert np.array_equal(found.frame.axes, wanted.frame.axes)
+    assert found.frame.reversed_winding == wanted.frame.reversed_winding
+    assert found.meters_per_unit == wanted.meters_per_unit
+    pairs = list(zip(found.walk(), wanted.walk(), strict=True))
+    for (a, above_a), (b, above_b) in pairs:
+        assert (a.name, [t.name for t in above_a]) == (b.name, [t.name for t in above_b])
+        if isinstance(b, Transform):
+            assert isinstance(a, Transform)
+            for name in ("translation", "rotation", "scale", "scale_orientation", "center"):
+                assert getattr(a, name) == getattr(b, name), (b.name, name)
+            continue
+        assert isinstance(a, Shape)
+        assert (a.role, a.materials) == (b.role, b.materials)
+        assert_same_array(a.vertex_ids, b.vertex_ids)
+        assert a.mesh.group_names == b.mesh.group_names
+        for name in PolyMesh.__dataclass_fields__:
+            if name != "group_names":
+                assert_same_array(getattr(a.mesh, name), getattr(b.mesh, name), f"{b.name} {name}")
+
+
+def assert_same_array(found: np.ndarray | None, wanted: np.ndarray | None, where: str = "") -> None:
+    """Both absent, or equal in type and every value."""
+    assert (found is None) == (wanted is None), where
+    if found is not None and wanted is not None:
+        assert found.dtype == wanted.dtype, where
+        assert np.array_equal(found, wanted), where
+
+
+def assert_same_face(found: AnimatableFace, wanted: AnimatableFace) -> None:
+    """The same scene, tables, feature points, FAPUs and notes, exactly."""
+    assert_same_scene(found.scene, wanted.scene)
+    assert found.fapu == wanted.fapu
+    assert dict(found.notes) == dict(wanted.notes)
+    assert found.feature_points == wanted.feature_points
+    assert [t.key for t in found.tables] == [t.key for t in wanted.tables]
+    for a, b in zip(found.tables, wanted.tables, strict=True):
+        assert a.transforms == b.transforms
+        assert [m.shape for m in a.meshes] == [m.shape for m in b.meshes]
+        for x, y in zip(a.meshes, b.meshes, strict=True):
+            for name in ("interval_borders", "coord_index", "displacements"):
+                assert_same_array(getattr(x, name), getattr(y, name), f"{b.name} {name}")

@@ -29,9 +29,9 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
         targets = []
         for shape in scene.shapes:
             own = draft.targets(shape.name)
-            back = _inverse(scene, shape.name)
+            turn = _inverse(scene, shape.name).T
             for name, deltas in zip(shapes.names, shapes.deltas, strict=True):
-                inside: Floats = scene.frame.from_file(deltas[places[shape.name]]) @ back.T
+                inside: Floats = scene.frame.from_file(deltas[places[shape.name]]) @ turn
                 offsets = to_single(draft.axes.vectors(inside))
                 index = np.flatnonzero(np.any(offsets != 0.0, axis=1)).astype(np.int32)
                 if index.size:
@@ -42,8 +42,9 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
 
 
 def _inverse(scene: FaceScene, name: str) -> Floats:
+    linear = scene.world_matrix(name)[:3, :3]
     try:
-        inverse: Floats = np.linalg.inv(scene.world_matrix(name)[:3, :3])
+        inverse: Floats = np.linalg.inv(linear)
     except np.linalg.LinAlgError:
         raise MeshError(f"shape '{name}' is scaled to nothing by the transforms above it") from None
     return inverse
@@ -60,7 +61,7 @@ def read_shapes(path: Path) -> ShapeSet | None:
         for shape in scene.shapes:
             linear = scene.world_matrix(shape.name)[:3, :3]
             for name, blend in _targets(prims[shape.name]):
-                local: Floats = axes.frame.from_file(_full(blend, shape.mesh.vertex_count))
+                local = axes.frame.from_file(_full(blend, shape.mesh.vertex_count))
                 found.setdefault(name, {})[shape.name] = local @ linear.T
         if not found:
             return None

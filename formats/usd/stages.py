@@ -31,7 +31,8 @@ def reading(path: Path) -> Iterator[None]:
     with quiet():
         try:
             yield
-        except (Tf.ErrorException, RuntimeError) as error:
+        except (Tf.ErrorException, RuntimeError, ValueError, TypeError, OverflowError) as error:
+            # OpenUSD's own errors; and Python's, where an attribute holds a value of another type than ours.
             raise InputFileError(f"{path} is not a readable USD file: {_first_message(error, path)}") from error
 
 
@@ -68,8 +69,12 @@ def save_layer(layer: Sdf.Layer, path: Path) -> None:
 
 
 def _first_message(error: Exception, path: Path) -> str:
-    found = re.search(r" : '(.*?)'\s*(?:\n|$)", str(error), re.DOTALL)
-    text = found.group(1) if found else str(error)
+    try:
+        whole = str(error)
+    except UnicodeDecodeError:
+        return "the text is not UTF-8"
+    found = re.search(r" : '(.*?)'\s*(?:\n|$)", whole, re.DOTALL)
+    text = found.group(1) if found else whole
     return _one_line(text.replace(str(path.absolute()), path.name))
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdSkel, UsdValidation
 
 from fba.findings import Finding
@@ -82,7 +83,7 @@ def _mesh(prim: Usd.Prim) -> Iterator[Finding]:
     yield from _extent(mesh, points, where)
 
 
-def _extent(mesh: UsdGeom.Mesh, points: np.ndarray[tuple[int, int], np.dtype[np.float32]], where: str) -> list[Finding]:
+def _extent(mesh: UsdGeom.Mesh, points: NDArray[Any], where: str) -> list[Finding]:
     extent = mesh.GetExtentAttr().Get()
     if extent is None:
         return [Finding("warning", "usd-extent", "the mesh has no extent; viewers cannot frame it quickly", where)]
@@ -169,8 +170,9 @@ def _table(prim: Usd.Prim, count: int, weights: list[float]) -> Iterator[Finding
         text = "the inbetweens are not at fba:intervalBorders divided by the last positive border"
         yield Finding("error", "usd-interval-borders", text, where)
     slopes = len(get(prim, "slopes") or ())
-    if slopes != count * (borders.size - 1):
-        text = f"fba:slopes has {slopes} vectors; {count} points and {borders.size - 1} intervals need {count * (borders.size - 1)}"
+    needed = count * (borders.size - 1)
+    if slopes != needed:
+        text = f"fba:slopes has {slopes} vectors; {count} points and {borders.size - 1} intervals need {needed}"
         yield Finding("error", "usd-slopes", text, where)
 
 
