@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from studio.render.camera import Camera, frame_face
+from studio.render.choice import make_renderer
 from studio.render.drawable import Drawable, Iris
 from studio.render.figure import Figure, Style, face_camera, render_pose
-from studio.render.protocol import Renderer, RendererError, make_renderer
+from studio.render.protocol import Renderer, RendererError
 
 __all__ = [
     "Camera",

@@ -13,11 +13,12 @@ from fba.arrays import Floats, Ints
 from fba.feature_points import FeaturePoints
 from fba.scene import FaceScene, Role, Shape
 from studio.render.camera import Camera, frame_face
+from studio.render.choice import make_renderer
 from studio.render.colors import EYES, GLOSS, clear_faces, eye_iris, is_clear, opacity, shape_colors
 from studio.render.drawable import Decal, Drawable, Iris, same_place, smooth_normals
 from studio.render.features import feature_decal
 from studio.render.occlusion import ambient_occlusion
-from studio.render.protocol import Renderer, make_renderer
+from studio.render.protocol import Renderer
 from studio.render.shading import UInt8
 
 SHADE_TINT = np.array([1.0, 1.30, 1.35])

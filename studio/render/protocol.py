@@ -1,21 +1,17 @@
-"""What every renderer can do, and which one this machine gets."""
+"""What every renderer can do, and what all of them need: depths and projections."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from fba.arrays import Floats
-from fba.errors import FbaError, MissingDependencyError
+from fba.errors import FbaError
 from studio.render.camera import Camera
 from studio.render.drawable import Drawable
 from studio.render.shading import UInt8
-
-Preference = Literal["auto", "egl", "software"]
-ENVIRONMENT = "FBA_RENDERER"
 
 
 class RendererError(FbaError):
@@ -35,40 +31,6 @@ class Renderer(Protocol):
     def render(self, drawables: Sequence[Drawable], camera: Camera, width: int, height: int) -> UInt8:
         """Return a picture, (height, width, 3) uint8, on the neutral backdrop."""
         ...
-
-
-def make_renderer(prefer: Preference | str = "auto") -> Renderer:
-    """Choose a renderer.
-
-    Parameters
-    ----------
-    prefer : "software" (numpy, works everywhere), "egl" (moderngl without a display, faster), or "auto": egl where
-        it works, else software; `name` says which and why. The environment variable FBA_RENDERER, when set,
-        decides instead.
-
-    Raises
-    ------
-    RendererError
-        If "egl" is wanted and does not work here, or the name is unknown.
-    MissingDependencyError
-        If "egl" is wanted and moderngl is not installed.
-    """
-    wanted = os.environ.get(ENVIRONMENT, "").strip().lower() or prefer
-    if wanted not in ("auto", "egl", "software"):
-        raise RendererError(f"there is no renderer '{wanted}'; choose auto, egl or software (also in {ENVIRONMENT})")
-    from studio.render.software import SoftwareRenderer
-
-    if wanted == "software":
-        return SoftwareRenderer()
-    from studio.render.egl import EglRenderer
-
-    try:
-        return EglRenderer()
-    except (MissingDependencyError, RendererError) as error:
-        if wanted == "egl":
-            raise
-        reason = "moderngl is not installed" if isinstance(error, MissingDependencyError) else "EGL does not work here"
-        return SoftwareRenderer(f"software ({reason})")
 
 
 def depth_range(drawables: Sequence[Drawable], camera: Camera) -> tuple[float, float]:
