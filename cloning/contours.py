@@ -28,10 +28,10 @@ class Contour:
 CONTOURS = (
     Contour(1, ("2.4", "2.6", "2.2", "2.7", "2.5"), 1),
     Contour(2, ("2.4", "2.8", "2.3", "2.9", "2.5"), 1),
-    Contour(3, ("3.11", "3.1", "3.7"), 3),
-    Contour(4, ("3.11", "3.3", "3.7"), 3),
-    Contour(5, ("3.8", "3.2", "3.12"), 3),
-    Contour(6, ("3.8", "3.4", "3.12"), 3),
+    Contour(3, ("3.11", "3.1", "3.7"), 5),
+    Contour(4, ("3.11", "3.3", "3.7"), 5),
+    Contour(5, ("3.8", "3.2", "3.12"), 5),
+    Contour(6, ("3.8", "3.4", "3.12"), 5),
 )
 
 INWARD_COST = 4.0
@@ -113,3 +113,31 @@ def _divide(line: Floats | None, positions: Mapping[str, Floats], a: str, b: str
         return []
     at = along[-1] * np.arange(1, count + 1) / (count + 1)
     return [np.array([np.interp(t, along, line[:, axis]) for axis in range(3)]) for t in at]
+
+
+def lid_profile(anchors: Mapping[str, tuple[int, Floats]]) -> dict[str, float]:
+    """How far the eye is open along its lids, relative to its middle.
+
+    Parameters
+    ----------
+    anchors : as from `contour_anchors`.
+
+    Returns
+    -------
+    name of a lid's anchor -> opening there divided by the opening in the middle; only where the lids are apart.
+    """
+    found: dict[str, float] = {}
+    for upper, lower in ((CONTOURS[2], CONTOURS[3]), (CONTOURS[4], CONTOURS[5])):
+        names = list(zip(_names(upper), _names(lower), strict=True))
+        if any(a not in anchors or b not in anchors for a, b in names):
+            continue
+        openings = [float(anchors[a][1][1] - anchors[b][1][1]) for a, b in names]
+        middle = 0.5 * (openings[upper.anchors - 1] + openings[upper.anchors])
+        for (a, b), opening in zip(names, openings, strict=True):
+            if opening > 0.0 and middle > 0.0:
+                found[a] = found[b] = opening / middle
+    return found
+
+
+def _names(contour: Contour) -> list[str]:
+    return [f"{a}-{b}/{k}" for a, b in pairwise(contour.points) for k in range(1, contour.anchors + 1)]

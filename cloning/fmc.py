@@ -14,11 +14,15 @@ import numpy as np
 
 from cloning.align import anchor_ids
 from cloning.backends import SkinTransfer
+from cloning.contours import contour_anchors, lid_profile
 from cloning.normalize import blend, ratios
 from cloning.prepare import PreparedFace
 from cloning.published import build_published
 from cloning.skin import FARTHEST, LEAST_FACING, SkinMap, build_skin_map
 from fba.arrays import Floats
+
+WIDEST = 2.0
+"""The local opening of the lids changes their FAPU ratio by at most this factor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,9 +41,7 @@ def build_transfer(source: PreparedFace, target: PreparedFace, as_published: boo
     """Prepare Facial Motion Cloning between two faces."""
     if as_published:
         return build_published(source, target)
-    ids = anchor_ids(source.skin, target.skin)
-    anchors = np.array([target.skin.positions[i] for i in ids])
-    scale = blend(target.skin.vertices, anchors, ratios(source.fapu, target.fapu, ids))
+    scale = scale_field(source, target)
     skin_map = build_skin_map(source.skin, source.labels, target.skin, target.labels, scale)
     found = ~skin_map.unmatched
     return AlignedTransfer(
@@ -51,3 +53,23 @@ def build_transfer(source: PreparedFace, target: PreparedFace, as_published: boo
         },
         {"farthest_es": FARTHEST, "least_facing": LEAST_FACING, "refinements": len(skin_map.refinements)},
     )
+
+
+def scale_field(source: PreparedFace, target: PreparedFace) -> Floats:
+    """FAPU ratios of every target vertex and axis, (n, 3), mesh units.
+
+    IRISD is the opening in the middle of the eye. Along the lids the vertical ratio follows the shape of both
+    openings, so that lids that meet in the middle meet everywhere.
+    """
+    ids = anchor_ids(source.skin, target.skin)
+    places = [target.skin.positions[i] for i in ids]
+    values = list(ratios(source.fapu, target.fapu, ids))
+    anchors = contour_anchors(target.skin)
+    mine, yours = lid_profile(contour_anchors(source.skin)), lid_profile(anchors)
+    lids = ratios(source.fapu, target.fapu, ["3.1"])[0]
+    for name, opening in yours.items():
+        if name in mine:
+            local = float(np.clip(opening / mine[name], 1.0 / WIDEST, WIDEST))
+            places.append(anchors[name][1])
+            values.append(lids * np.array([1.0, local, 1.0]))
+    return blend(target.skin.vertices, np.array(places), np.array(values))

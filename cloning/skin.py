@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from cloning.align import align
+from cloning.align import align, anchor_ids
 from cloning.antialias import edge_samples
 from cloning.fill import HarmonicFill
 from cloning.labels import Labels
 from cloning.locate import Places, closest
 from cloning.refine import Refinement, refine
+from cloning.settle import settle
 from cloning.surface import Surface, polygon_edges
 from fba.arrays import Bools, Floats, Ints
 
@@ -75,9 +76,16 @@ def build_skin_map(
     """
     refinements, fine, fine_labels = _refined(source, source_labels.values, target)
     moved = align(source, target, target_labels.values)
-    normals = target.normals_of(moved)
     labels = target_labels.values
-    places = _find(moved, normals, labels, fine, fine_labels)
+
+    def locate(points: Floats) -> tuple[Places, Floats]:
+        found = _find(points, target.normals_of(points), labels, fine, fine_labels)
+        corners = fine.vertices[fine.triangles[found.triangles]]
+        return found, np.einsum("nk,nkd->nd", found.weights, corners)
+
+    fixed = target.point_matrix(anchor_ids(source, target))
+    moved, places = settle(target, moved, fixed, locate, FARTHEST, LEAST_FACING)
+    normals = target.normals_of(moved)
     spacing = _spacing(fine)[np.maximum(places.triangles, 0)]
     extra = edge_samples(moved, normals, target.edges, labels, spacing)
     more = _find(extra.points, extra.normals, labels[extra.owners], fine, fine_labels)
