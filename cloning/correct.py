@@ -28,6 +28,12 @@ NARROWEST = 0.03
 ACTIVE = 0.04
 """Skin that moves more than this share of a motion's largest offset takes the full correction."""
 
+SOFT = 0.05
+"""Regularization of the wide bumps, relative to the mean diagonal: they overlap and must not fight."""
+
+EXACT = 1e-8
+"""Regularization of the narrow bumps."""
+
 TRUSTED = 0.3
 """Feature points on skin that is less active than this count less and less: nearly nothing moves there."""
 
@@ -39,11 +45,13 @@ class Correction:
     Attributes
     ----------
     ids : the feature points.
-    bumps : (n, k) sparse.
+    wide : (n, k) sparse, bumps of the largest width; they take what neighbouring points miss together.
+    bumps : (n, k) sparse, bumps as wide as the next feature point is away; they make each point exact.
     evaluate : (k, n) sparse, a field at the feature points.
     """
 
     ids: tuple[str, ...]
+    wide: Any
     bumps: Any
     evaluate: Any
 
@@ -59,25 +67,33 @@ class Correction:
         -------
         before, after : (k, K, 3) what the feature points miss.
         """
-        k, count = len(self.ids), motion.shape[1]
-        flat = motion.reshape(len(motion), -1)
-        before = goals - (self.evaluate @ flat).reshape(k, count, 3)
+        before = goals - self._at_points(motion)
         active = self._activity(motion, goals)
+        self._add(self.wide, SOFT, before, active, motion)
+        self._add(self.bumps, EXACT, goals - self._at_points(motion), active, motion)
+        return before, goals - self._at_points(motion)
+
+    def _at_points(self, motion: Floats) -> Floats:
+        at: Floats = (self.evaluate @ motion.reshape(len(motion), -1)).reshape(-1, *motion.shape[1:])
+        return at
+
+    def _add(self, bumps: Any, ridge: float, missing: Floats, active: Floats, motion: Floats) -> None:
+        """Solve for the heights of the bumps, motion by motion, and add them."""
+        k, count = len(self.ids), motion.shape[1]
         support = np.unique(self.evaluate.indices)
         at_points = self.evaluate[:, support].toarray()
-        at_support = self.bumps[support].toarray()
+        at_support = bumps[support].toarray()
         heights = np.zeros((k, count, 3))
         for m in range(count):
             here = active[support, m]
             rows = np.clip(at_points @ here / TRUSTED, 0.0, 1.0)[:, None]
             system = rows * (at_points @ (here[:, None] * at_support))
             normal = system.T @ system
-            normal[np.diag_indices(k)] += 1e-8 * max(float(np.trace(normal)) / k, 1e-30)
-            heights[:, m] = np.linalg.solve(normal, system.T @ (rows * before[:, m]))
-        added = (self.bumps @ heights.reshape(k, -1)).reshape(motion.shape)
-        motion += added * active[:, :, None]
-        after = goals - (self.evaluate @ motion.reshape(len(motion), -1)).reshape(k, count, 3)
-        return before, after
+            normal[np.diag_indices(k)] += ridge * max(float(np.trace(normal)) / k, 1e-30)
+            heights[:, m] = np.linalg.solve(normal, system.T @ (rows * missing[:, m]))
+        added = (bumps @ heights.reshape(k, -1)).reshape(motion.shape)
+        added *= active[:, :, None]
+        motion += added
 
     def _activity(self, motion: Floats, goals: Floats) -> Floats:
         """(n, K) 0 where the skin rests and may not be moved, up to 1 where it moves or a feature point must."""
@@ -101,18 +117,22 @@ def _smooth_step(t: Floats) -> Floats:
 
 def correction(surface: Surface, ids: Sequence[str]) -> Correction:
     """Build the bumps of these feature points of a target skin."""
-    from scipy.sparse import csr_array
-
     ids = tuple(ids)
     distances = surface.distances(ids, REACH * WIDTH)
     evaluate = surface.point_matrix(ids)
     between = np.array([(evaluate @ row.clip(max=1.0)) for row in distances]).reshape(len(ids), -1)
     np.fill_diagonal(between, np.inf)
     gap = between.min(axis=1) if len(ids) > 1 else np.full(len(ids), np.inf)
-    widths = np.clip(gap, NARROWEST, WIDTH)
+    narrow = _bumps(distances, np.clip(gap, NARROWEST, WIDTH))
+    return Correction(ids, _bumps(distances, np.full(len(ids), WIDTH)), narrow, evaluate)
+
+
+def _bumps(distances: Floats, widths: Floats) -> Any:
+    """(n, k) sparse Gaussian bumps of these widths, from (k, n) distances, that end smoothly at REACH widths."""
+    from scipy.sparse import csr_array
+
     scaled = distances / (REACH * widths[:, None])
     rows, columns = np.nonzero(scaled < 1.0)
     t = scaled[rows, columns]
     values = np.exp(-0.5 * (REACH * t) ** 2) * (1.0 - t * t) ** 2
-    bumps = csr_array((values, (columns, rows)), shape=(surface.vertex_count, len(ids)))
-    return Correction(ids, bumps, evaluate)
+    return csr_array((values, (columns, rows)), shape=distances.T.shape)
