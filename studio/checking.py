@@ -1,0 +1,169 @@
+"""Is an animatable face good? Conformance by itself, fidelity beside the source it was cloned from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fat.build import face_motions
+from fat.conformance import FapConformance, conformance
+from fat.evaluate import Player
+from fat.face import AnimatableFace
+from fat.motion import FaceMotion
+from fat.quality import fap_error, fap_values, feature_point_motion, flips, lid_gap, lip_gap_change
+from fat.validate import validate
+from fba.arrays import Floats
+from fba.findings import Finding
+from fba.scene import Role
+
+FP_ERROR_MUST = 0.01
+"""Largest mean relative error over all feature points of a motion."""
+LIP_GAP_MUST = 0.01
+"""MNS; largest change of the lips' opening against the source."""
+LID_GAP_MUST = 0.05
+"""IRISD; how much wider than the source's an eye may stay open after a blink."""
+FLIPS_MUST = 0.3
+"""Percent of moving triangles beyond the source's, mean over all motions."""
+BLINK = {19: 1024.0, 20: 1024.0}
+
+
+@dataclass(frozen=True, slots=True)
+class Fidelity:
+    """A clone beside its source; means and worst values over the motions that both have.
+
+    fp_error : relative error over all feature points and FAP axes (0.01 = 1 %).
+    lip_gap : largest change of the lips' opening in MNS.
+    lid_gap : how much wider the worse eye stays open after a blink, in IRISD; None without eyelid FAPs.
+    flips : percent of moving skin triangles turned by more than 90 degrees.
+    """
+
+    motions: int
+    fp_error_mean: float
+    fp_error_worst: float
+    fp_error_worst_motion: str
+    lip_gap: float
+    lip_gap_motion: str
+    lid_gap: float | None
+    flips_mean: float
+    source_flips_mean: float
+
+    def failures(self) -> list[Finding]:
+        """Everything beyond the limits above."""
+        rows = [
+            ("fp-error", self.fp_error_mean, FP_ERROR_MUST, "mean feature point error beside the source"),
+            ("lip-gap", self.lip_gap, LIP_GAP_MUST, f"lips open differently in {self.lip_gap_motion}, MNS"),
+            ("lid-gap", self.lid_gap or 0.0, LID_GAP_MUST, "eyes stay open after a blink, IRISD beyond the source"),
+            ("flips", self.flips_mean - self.source_flips_mean, FLIPS_MUST, "% of triangles flip beyond the source's"),
+        ]
+        return [
+            Finding("error", code, f"{text}: {value:.3g}, at most {limit:g}")
+            for code, value, limit, text in rows
+            if value > limit
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class CheckResult:
+    """What `fba check` prints."""
+
+    findings: tuple[Finding, ...]
+    neutral_unchanged: bool
+    faps: tuple[FapConformance, ...]
+    fidelity: Fidelity | None
+
+    @cached_property
+    def problems(self) -> tuple[Finding, ...]:
+        """Every reason why the face fails, on top of `findings`."""
+        out = []
+        if not self.neutral_unchanged:
+            out.append(Finding("error", "neutral", "the neutral face moves although every FAP is 0"))
+        for fap in self.faps:
+            if not fap.passed:
+                text = f"{fap.name} at {fap.value} moves its feature point {fap.point} by {fap.found:.1f} FAP units"
+                out.append(Finding("error", "own-fp", text, f"FAP {fap.fap_id}"))
+        return (*out, *(self.fidelity.failures() if self.fidelity else ()))
+
+    @property
+    def passed(self) -> bool:
+        return not self.problems and all(f.severity != "error" for f in self.findings)
+
+    def to_dict(self) -> dict[str, object]:
+        """Everything as plain data."""
+        return {
+            "passed": self.passed,
+            "neutral_unchanged": self.neutral_unchanged,
+            "findings": [asdict(f) for f in (*self.problems, *self.findings)],
+            "faps": [{**asdict(f), "relative_error": f.relative_error, "passed": f.passed} for f in self.faps],
+            "fidelity": asdict(self.fidelity) if self.fidelity else None,
+        }
+
+
+def check_face(face: AnimatableFace, source: AnimatableFace | None = None) -> CheckResult:
+    """Check a face; tables that cannot be played are reported, not measured."""
+    findings = tuple(validate(face))
+    if any(f.severity == "error" for f in findings):
+        return CheckResult(findings, True, (), None)
+    neutral = Player(face).pose().local
+    unchanged = all(neutral[s.name].tobytes() == s.mesh.vertices.tobytes() for s in face.scene.shapes)
+    return CheckResult(
+        findings, unchanged, tuple(conformance(face)), None if source is None else fidelity(face, source)
+    )
+
+
+def fidelity(face: AnimatableFace, source: AnimatableFace) -> Fidelity | None:
+    """Compare every motion that both faces have; None if there is none."""
+    mine = {(m.fap_id, m.select, m.value): m for m in face_motions(face)}
+    theirs = {(m.fap_id, m.select, m.value): m for m in face_motions(source)}
+    common = [key for key in theirs if key in mine]
+    if not common:
+        return None
+    errors, lips = {}, {}
+    for key in common:
+        a, b = _points(source, theirs[key]), _points(face, mine[key])
+        name = f"{theirs[key].name} at {theirs[key].value}"
+        errors[name] = fap_error(fap_values(a, source.fapu), fap_values(b, face.fapu)).relative
+        lips[name] = lip_gap_change(a, source.fapu, b, face.fapu)
+    finite = {k: v for k, v in errors.items() if np.isfinite(v)}
+    worst = max(finite, key=lambda k: finite[k], default="")
+    lip = max(lips, key=lambda k: lips[k])
+    return Fidelity(
+        len(common),
+        float(np.mean(list(finite.values()))) if finite else 0.0,
+        finite.get(worst, 0.0),
+        worst,
+        lips[lip],
+        lip,
+        _lid_gap_beyond(face, source),
+        _flips(face, [mine[k] for k in common]),
+        _flips(source, [theirs[k] for k in common]),
+    )
+
+
+def _points(face: AnimatableFace, motion: FaceMotion) -> dict[str, Floats]:
+    return feature_point_motion(face.feature_points, motion.offsets)
+
+
+def _flips(face: AnimatableFace, motions: list[FaceMotion]) -> float:
+    skins = [(s.name, face.scene.world_vertices(s.name), s.mesh.triangles) for s in face.scene.with_role(Role.SKIN)]
+    values = [
+        flips(vertices, triangles, motion.offsets[name])
+        for motion in motions
+        for name, vertices, triangles in skins
+        if name in motion.offsets
+    ]
+    return float(np.mean(values)) if values else 0.0
+
+
+def _lid_gap_beyond(face: AnimatableFace, source: AnimatableFace) -> float | None:
+    gaps: list[Mapping[str, float]] = []
+    for one in (source, face):
+        if any(one.tables.get(number) is None for number in BLINK):
+            return None
+        rest = one.feature_points.positions(one.scene)
+        moved = one.feature_points.positions(one.scene, Player(one).pose(BLINK).world_shapes())
+        gaps.append(lid_gap(rest, {k: moved[k] - rest[k] for k in rest}, one.fapu))
+    common = gaps[0].keys() & gaps[1].keys()
+    return max((gaps[1][k] - gaps[0][k] for k in common), default=None)

@@ -1,0 +1,7 @@
+"""The command ``fba``: one module a verb. Only this layer exits, prints, and turns errors into exit codes."""
+
+from __future__ import annotations
+
+from studio.cli.app import main
+
+__all__ = ["main"]

@@ -1,0 +1,7 @@
+"""``python -m studio.cli``: the command without its script."""
+
+from __future__ import annotations
+
+from studio.cli.app import main
+
+main()

@@ -1,0 +1,49 @@
+"""Arguments that several verbs share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+FacePath = Annotated[Path, typer.Argument(help="A face file; the word 'default' names the shipped source face.")]
+OutPath = Annotated[Path, typer.Option("--output", "-o", help="Where to write; the extension chooses the format.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
+
+
+def parse_faps(text: str) -> tuple[int, ...]:
+    """Turn "3,5,12-14,open_jaw" into FAP numbers.
+
+    Raises
+    ------
+    ValueError
+        If a part is neither a FAP number, a range nor a FAP name.
+
+    >>> parse_faps("3,12-14")
+    (3, 12, 13, 14)
+    """
+    from fba.faps import fap
+
+    numbers: list[int] = []
+    for part in filter(None, (p.strip() for p in text.split(","))):
+        low, dash, high = part.partition("-")
+        if dash and low.isdigit() and high.isdigit():
+            numbers += range(int(low), int(high) + 1)
+        else:
+            numbers.append(int(part) if part.isdigit() else _by_name(part))
+    for number in numbers:
+        try:
+            fap(number)
+        except KeyError as error:
+            raise ValueError(str(error.args[0])) from None
+    return tuple(dict.fromkeys(numbers))
+
+
+def _by_name(name: str) -> int:
+    from fba.faps import fap
+
+    try:
+        return fap(name).id
+    except KeyError:
+        raise ValueError(f"'{name}' is neither a FAP number nor the name of a FAP") from None

@@ -1,0 +1,152 @@
+"""``fba clone``: make a plain mesh animatable."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from studio.cli.outcome import usage
+
+if TYPE_CHECKING:
+    from cloning import CloneReport
+
+TargetPath = Annotated[Path, typer.Argument(help="The plain face mesh that shall become animatable.")]
+Out = Annotated[Path, typer.Option("--output", "-o", help="Where to write; the extension chooses the format.")]
+Landmarks = Annotated[Path | None, typer.Option(help="Feature points of the target; default: NAME.fps.json beside it.")]
+Shapes = Annotated[
+    Path | None,
+    typer.Option(help="Clone these morph targets of --source instead: a folder of OBJ, an .npz or a glTF."),
+]
+
+
+def clone(
+    target: TargetPath,
+    output: Out,
+    source: Annotated[str, typer.Option(help="The animatable face whose motion is cloned.")] = "default",
+    landmarks: Landmarks = None,
+    source_landmarks: Annotated[
+        Path | None, typer.Option(help="Feature points of --source where it has none of its own.")
+    ] = None,
+    backend: Annotated[str, typer.Option(help="How motion is cloned: fmc.")] = "fmc",
+    as_published: Annotated[
+        bool, typer.Option("--as-published", help="Do literally what the paper says, for comparison.")
+    ] = False,
+    faps: Annotated[str | None, typer.Option(help="Only these FAPs, e.g. 3,5,12-14 or open_jaw.")] = None,
+    shapes: Shapes = None,
+    report: Annotated[Path | None, typer.Option(help="Write measures, warnings and timings as JSON.")] = None,
+    sheet: Annotated[Path | None, typer.Option(help="Write a contact sheet (PNG): source above target.")] = None,
+) -> None:
+    """Clone the motion of an animatable face onto a plain mesh and write an animatable face."""
+    from studio.cli.arguments import parse_faps
+
+    try:
+        wanted = None if faps is None else parse_faps(faps)
+    except ValueError as error:
+        usage(f"--faps: {error}")
+    if shapes is not None:
+        if wanted is not None or sheet is not None:
+            usage("--shapes clones every shape as it is; it does not go with --faps or --sheet")
+        _clone_shapes(target, output, source, landmarks, source_landmarks, shapes, backend, as_published, report)
+    else:
+        _clone_face(target, output, source, landmarks, source_landmarks, wanted, backend, as_published, report, sheet)
+
+
+def _clone_face(
+    target: Path,
+    output: Path,
+    source: str,
+    landmarks: Path | None,
+    source_landmarks: Path | None,
+    faps: tuple[int, ...] | None,
+    backend: str,
+    as_published: bool,
+    report: Path | None,
+    sheet: Path | None,
+) -> None:
+    from dataclasses import replace
+
+    from cloning import clone_with_report
+    from formats import format_of, read, read_face, write
+    from formats.landmarks import read_landmarks
+    from studio.cli.console import console, print_findings, progress
+    from studio.inputs import points_of, scene_of
+    from studio.sheet import contact_sheet, save_png
+
+    entry = format_of(output, writing=True)
+    if not entry.carries_tables:
+        usage(f"{output}: {entry.name} cannot carry Facial Animation Tables; choose .wrl, .bt, .usda or .usdc")
+    animatable = read_face(source)
+    if source_landmarks is not None:
+        points = read_landmarks(source_landmarks, animatable.scene)
+        animatable = replace(animatable, feature_points=points)
+    with progress() as tell:
+        tell("reading", 0.0)
+        found = read(target)
+        points_given = points_of(found, target, landmarks)
+        scene = scene_of(found)
+        face, made = clone_with_report(
+            animatable, scene, points_given, backend=backend, as_published=as_published, faps=faps, progress=tell
+        )
+        tell("writing", 0.95)
+        write(face, output)
+        if sheet is not None:
+            tell("drawing", 0.97)
+            save_png(contact_sheet(animatable, face, title=face.scene.name), sheet)
+        if report is not None:
+            _write_report(made, report)
+    out = console()
+    print_findings(made.findings, out)
+    out.print(f"{output}: {len(face.tables)} tables for {face.scene.vertex_count} vertices")
+
+
+def _clone_shapes(
+    target: Path,
+    output: Path,
+    source: str,
+    landmarks: Path | None,
+    source_landmarks: Path | None,
+    shapes: Path,
+    backend: str,
+    as_published: bool,
+    report: Path | None,
+) -> None:
+    from formats.shapes import read_shapes, write_shapes
+
+    from cloning import clone_shapes
+    from fba.errors import LandmarkError
+    from formats import read
+    from studio.cli.console import console, print_findings, progress
+    from studio.inputs import points_of, scene_of
+
+    neutral = read(source)
+    neutral_scene = scene_of(neutral)
+    neutral_points = points_of(neutral, Path(source), source_landmarks)
+    if neutral_points is None:
+        raise LandmarkError(f"{source} has no feature points; give them with --source-landmarks POINTS.json")
+    found = read(target)
+    scene = scene_of(found)
+    with progress() as tell:
+        made, about = clone_shapes(
+            neutral_scene,
+            neutral_points,
+            read_shapes(shapes, neutral_scene),
+            scene,
+            points_of(found, target, landmarks),
+            backend=backend,
+            as_published=as_published,
+            progress=tell,
+        )
+        write_shapes(made, scene, output)
+        if report is not None:
+            _write_report(about, report)
+    out = console()
+    print_findings(about.findings, out)
+    out.print(f"{output}: {len(made.names)} shapes for {len(made.neutral)} vertices")
+
+
+def _write_report(made: CloneReport, path: Path) -> None:
+    from formats.files import write_bytes
+
+    write_bytes(path, (made.to_json() + "\n").encode())

@@ -1,0 +1,59 @@
+"""Exit codes, and how an error becomes one clear message."""
+
+from __future__ import annotations
+
+import functools
+import sys
+import traceback
+from collections.abc import Callable
+from enum import IntEnum
+from typing import ParamSpec
+
+import typer
+
+from fba.errors import FbaError
+
+P = ParamSpec("P")
+
+
+class Outcome(IntEnum):
+    """Exit codes of the command line."""
+
+    OK = 0
+    FINDINGS = 1
+    USAGE = 2
+    BAD_INPUT = 3
+    INTERRUPTED = 130
+
+
+def guarded(verb: Callable[P, None]) -> Callable[P, None]:
+    """Let a verb end with an exit code and one message instead of a traceback."""
+
+    @functools.wraps(verb)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            verb(*args, **kwargs)
+        except FbaError as error:
+            fail(str(error))
+        except KeyboardInterrupt:
+            print("fba: interrupted", file=sys.stderr)
+            raise typer.Exit(Outcome.INTERRUPTED) from None
+        except (OSError, MemoryError) as error:
+            fail(f"{type(error).__name__}: {error}")
+        except RecursionError:
+            traceback.print_exc(limit=3)
+            fail("the input is nested too deeply")
+
+    return run
+
+
+def fail(message: str) -> None:
+    """Print one message on stderr and end with BAD_INPUT."""
+    print(f"fba: error: {message}", file=sys.stderr)
+    raise typer.Exit(Outcome.BAD_INPUT)
+
+
+def usage(message: str) -> None:
+    """Print one message on stderr and end with USAGE."""
+    print(f"fba: usage: {message}", file=sys.stderr)
+    raise typer.Exit(Outcome.USAGE)

@@ -1,0 +1,312 @@
+"""The command line: what it does, what it prints, how it ends."""
+
+from __future__ import annotations
+
+import json
+import re
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from fat import AnimatableFace
+from formats import read, read_face, read_scene
+from samples import sample
+from studio.cli.app import app
+from studio.cli.arguments import parse_faps
+from studio.cli.outcome import Outcome
+
+VERBS = ("demo", "inspect", "clone", "export", "play", "check", "doctor")
+
+
+def fba(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def refused(result: Result, *said: str) -> None:
+    """The command ended with exit code 3 and one message that says all of this."""
+    assert result.exit_code == Outcome.BAD_INPUT, result.output
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    lines = [line for line in result.stderr.splitlines() if line.strip()]
+    assert len(lines) == 1, result.stderr
+    assert lines[0].startswith("fba: error: ")
+    for words in said:
+        assert words in lines[0]
+
+
+@pytest.fixture(scope="session")
+def cloned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shipped triangle head made animatable through the command line."""
+    path = tmp_path_factory.mktemp("cli") / "tri.wrl"
+    result = fba("clone", sample("faces/tri_head.obj"), "-o", path, "--report", path.with_suffix(".json"))
+    assert result.exit_code == 0, result.output
+    return path
+
+
+def test_help_of_every_verb() -> None:
+    assert fba("--help").exit_code == 0
+    for verb in VERBS:
+        result = fba(verb, "--help")
+        assert result.exit_code == 0
+        assert verb in result.stdout
+
+
+def test_version_is_that_of_the_package() -> None:
+    assert re.fullmatch(r"fba-toolkit \d+\.\d+\.\d+\n", fba("--version").stdout)
+
+
+def test_unknown_words_are_a_usage_error() -> None:
+    assert fba("fly").exit_code == Outcome.USAGE
+    assert fba("clone").exit_code == Outcome.USAGE
+    assert fba("clone", "a.obj", "-o", "b.wrl", "--faps", "3,99").exit_code == Outcome.USAGE
+
+
+def test_fap_lists() -> None:
+    assert parse_faps("3,12-14,open_jaw,19") == (3, 12, 13, 14, 19)
+    for wrong in ("0", "69", "jaw_open", "5-", "3;4"):
+        with pytest.raises(ValueError, match=r"FAP"):
+            parse_faps(wrong)
+
+
+def test_clone_keeps_the_mesh_and_reports(cloned: Path) -> None:
+    face = read_face(cloned)
+    head = read_scene(sample("faces/tri_head.obj"))
+    np.testing.assert_array_equal(face.scene.world_neutral(), head.world_neutral())
+    assert sum(s.mesh.face_count for s in face.scene.shapes) == head.shapes[0].mesh.face_count
+    report = json.loads(cloned.with_suffix(".json").read_text())
+    assert report["backend"] == "fmc"
+    assert report["timings"]
+
+
+def test_clone_only_some_faps(tmp_path: Path) -> None:
+    out = tmp_path / "some.usda"
+    assert fba("clone", sample("faces/tri_head.obj"), "-o", out, "--faps", "3,19-20").exit_code == 0
+    assert [t.fap_id for t in read_face(out).tables] == [3, 19, 20]
+
+
+def test_check_passes_on_a_clone_and_prints_json(cloned: Path) -> None:
+    result = fba("check", cloned, "--source", "default", "--json")
+    assert result.exit_code == 0, result.output
+    document = json.loads(result.stdout)
+    assert document["passed"] is True
+    assert document["faps"]
+
+
+def test_inspect_says_what_a_face_can_play(cloned: Path) -> None:
+    result = fba("inspect", cloned, "--json")
+    assert result.exit_code == 0, result.output
+    document = json.loads(result.stdout)
+    assert 3 in document["tables"]["faps"]
+    assert document["fapu"]["ES0"] > 0
+    assert "plays:" in fba("inspect", cloned).stdout
+
+
+def test_inspect_a_plain_mesh_and_a_stream() -> None:
+    document = json.loads(fba("inspect", sample("faces/tri_head.obj"), "--json").stdout)
+    assert document["kind"].startswith("plain mesh")
+    assert json.loads(fba("inspect", sample("streams/demo.fap"), "--json").stdout)["frames"] > 50
+
+
+def test_play_writes_vertices_in_the_files_own_order(cloned: Path, tmp_path: Path) -> None:
+    out = tmp_path / "played.npz"
+    assert fba("play", cloned, "demo", "-o", out).exit_code == 0
+    with np.load(out) as played:
+        neutral, vertices, rate = played["neutral"], played["vertices"], float(played["fps"])
+    head = read_scene(sample("faces/tri_head.obj"))
+    np.testing.assert_array_equal(neutral, head.world_neutral())
+    assert vertices.shape[1:] == neutral.shape
+    assert rate == 25
+    assert np.abs(vertices - neutral).max() > 0
+
+
+def test_play_draws(cloned: Path, tmp_path: Path) -> None:
+    from PIL import Image
+
+    short = tmp_path / "short.fap"
+    lines = sample("streams/demo.fap").read_text().splitlines()
+    header = next(i for i, line in enumerate(lines) if not line.startswith("#"))
+    words = lines[header].split()
+    lines[header] = " ".join([*words[:-1], "3"])
+    short.write_text("\n".join(lines[: header + 7]) + "\n")
+    out = tmp_path / "short.gif"
+    result = fba("play", cloned, short, "-o", out, "--size", "64")
+    assert result.exit_code == 0, result.output
+    with Image.open(out) as picture:
+        assert picture.n_frames == 3
+    folder = tmp_path / "frames"
+    assert fba("play", cloned, short, "-o", folder, "--size", "64").exit_code == 0
+    assert len(list(folder.glob("*.png"))) == 3
+
+
+def test_export_to_every_format_and_back(cloned: Path, tmp_path: Path) -> None:
+    before = read_face(cloned)
+    for name in ("a.usda", "a.usdc", "a.bt", "a.wrl.gz"):
+        out = tmp_path / name
+        assert fba("export", cloned, "-o", out).exit_code == 0
+        after = read_face(out)
+        assert [t.key for t in after.tables] == [t.key for t in before.tables]
+    out = tmp_path / "a.obj"
+    result = fba("export", cloned, "-o", out)
+    assert result.exit_code == 0
+    assert "neutral mesh only" in result.stdout
+    np.testing.assert_array_equal(
+        read_scene(out).world_neutral(), read_scene(sample("faces/tri_head.obj")).world_neutral()
+    )
+
+
+def test_doctor_finds_the_shipped_face() -> None:
+    document = json.loads(fba("doctor", "--json").stdout)
+    assert {c["name"]: c["ok"] for c in document["checks"]}["shipped source face"]
+
+
+def test_free_shapes(tmp_path: Path) -> None:
+    head = read_scene(sample("faces/tri_head.obj"))
+    neutral = head.world_neutral()
+    up = np.zeros((1, *neutral.shape))
+    up[0, :, 1] = 0.01 * np.exp(-(((neutral - neutral[neutral[:, 2].argmax()]) / 0.3) ** 2).sum(axis=1))
+    np.savez(tmp_path / "in.npz", names=np.array(["nose lift"]), deltas=up, neutral=neutral)
+    out = tmp_path / "out.npz"
+    result = fba(
+        *("clone", sample("faces/quad_head.obj"), "-o", out),
+        *("--source", sample("faces/tri_head.obj"), "--shapes", tmp_path / "in.npz"),
+    )
+    assert result.exit_code == 0, result.output
+    with np.load(out) as made:
+        assert made["names"].tolist() == ["nose lift"]
+        assert made["neutral"].shape == made["deltas"].shape[1:]
+        assert np.abs(made["deltas"]).max() > 0.001
+
+
+# Bad input: one clear message, exit code 3, and nothing lost.
+
+
+def test_missing_and_empty_files(tmp_path: Path) -> None:
+    refused(fba("inspect", tmp_path / "none.obj"), "none.obj", "does not exist")
+    empty = tmp_path / "empty.obj"
+    empty.write_bytes(b"")
+    refused(fba("clone", empty, "-o", tmp_path / "out.wrl"), "empty.obj", "empty")
+
+
+@pytest.mark.parametrize("name", ["text.obj", "text.ply", "text.stl", "text.off", "text.glb", "text.wrl", "text.usda"])
+def test_not_a_mesh(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_text("Dear diary, today I met a face.\nIt did not move.\n")
+    refused(fba("inspect", path), name)
+
+
+def test_unknown_kind_of_file(tmp_path: Path) -> None:
+    path = tmp_path / "face.xyz"
+    path.write_text("0 0 0")
+    refused(fba("inspect", path), "face.xyz", "known extensions")
+
+
+def test_a_mesh_without_feature_points(tmp_path: Path) -> None:
+    lonely = tmp_path / "lonely.obj"
+    lonely.write_bytes(sample("faces/tri_head.obj").read_bytes())
+    refused(fba("clone", lonely, "-o", tmp_path / "out.wrl"), "feature points", "--landmarks")
+    assert not (tmp_path / "out.wrl").exists()
+
+
+def _points() -> dict[str, dict[str, object]]:
+    return json.loads(sample("faces/tri_head.fps.json").read_text())["points"]
+
+
+def _with_points(tmp_path: Path, points: dict[str, dict[str, object]]) -> Result:
+    path = tmp_path / "points.json"
+    path.write_text(json.dumps({"format": "fba-landmarks/1", "points": points}))
+    return fba("clone", sample("faces/tri_head.obj"), "-o", tmp_path / "out.wrl", "--landmarks", path)
+
+
+def test_feature_points_off_the_surface(tmp_path: Path) -> None:
+    points = _points()
+    points["9.3"] = {"position": [0.0, 0.0, 1000.0]}
+    refused(_with_points(tmp_path, points), "9.3", "surface")
+
+
+def test_feature_points_swapped_left_and_right(tmp_path: Path) -> None:
+    from fba import feature_point_definitions
+
+    points = _points()
+    mirror = {i: d.counterpart for i, d in feature_point_definitions().items() if d.counterpart}
+    refused(_with_points(tmp_path, {mirror.get(i, i): p for i, p in points.items()}), "left", "right")
+
+
+def test_feature_points_that_are_not_there(tmp_path: Path) -> None:
+    points = _points()
+    del points["2.2"]
+    refused(_with_points(tmp_path, points), "2.2")
+    refused(_with_points(tmp_path, {**_points(), "9.3": {"vertex": 10**9}}), "9.3")
+    refused(_with_points(tmp_path, {**_points(), "99.1": {"vertex": 1}}), "99.1")
+    broken = tmp_path / "broken.json"
+    broken.write_text('{"format": "fba-landmarks/1", "points": {')
+    refused(fba("clone", sample("faces/tri_head.obj"), "-o", tmp_path / "o.wrl", "--landmarks", broken), "broken.json")
+
+
+def test_vertices_that_are_not_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "nan.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n")
+    refused(fba("inspect", path), "nan.obj")
+
+
+def test_tables_whose_indices_exceed_the_mesh(cloned: Path, tmp_path: Path) -> None:
+    text = cloned.read_text()
+    place = re.search(r"FaceDefMesh\s*\{[^}]*?coordIndex\s*\[\s*(\d+)", text)
+    assert place is not None
+    path = tmp_path / "beyond.wrl"
+    path.write_text(text[: place.start(1)] + "99999999" + text[place.end(1) :])
+    for words in (("check", path), ("play", path, "demo", "-o", tmp_path / "o.npz")):
+        result = fba(*words)
+        assert result.exit_code in (Outcome.FINDINGS, Outcome.BAD_INPUT)
+        assert "99999999" in result.output
+    assert not (tmp_path / "o.npz").exists()
+
+
+def test_a_stream_cut_in_the_middle(cloned: Path, tmp_path: Path) -> None:
+    data = sample("streams/demo.fap").read_bytes()
+    path = tmp_path / "cut.fap"
+    path.write_bytes(data[: len(data) // 2].rstrip(b"0123456789 \n") + b" 1 2")
+    refused(fba("play", cloned, path, "-o", tmp_path / "o.npz"), "cut.fap", "line")
+
+
+def test_output_that_cannot_be_written(cloned: Path, tmp_path: Path) -> None:
+    for name in ("o.wrl", "o.usda", "o.obj", "o.bt"):
+        refused(fba("export", cloned, "-o", tmp_path / "no_such_folder" / name), "cannot write")
+    refused(fba("play", cloned, "demo", "-o", tmp_path / "no_such_folder" / "o.npz"), "cannot write")
+    taken = tmp_path / "taken.wrl"
+    taken.mkdir()
+    refused(fba("export", cloned, "-o", taken), "taken.wrl")
+    refused(fba("export", cloned, "-o", tmp_path / "o.xyz"), "o.xyz")
+
+
+@pytest.mark.parametrize("name", ["o.wrl", "o.usda", "o.usdc", "o.bt", "o.obj", "o.npz", "o.gif"])
+def test_a_full_disk_leaves_the_old_file(cloned: Path, tmp_path: Path, name: str) -> None:
+    """A limit on the size of files stands in for the full disk."""
+    out = tmp_path / name
+    out.write_text("precious")
+
+    def small_files() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+    verb = ["play", str(cloned), "demo"] if name.endswith((".npz", ".gif")) else ["export", str(cloned)]
+    done = subprocess.run(
+        [sys.executable, "-m", "studio.cli", *verb, "-o", str(out)],
+        capture_output=True,
+        text=True,
+        preexec_fn=small_files,
+        check=False,
+    )
+    assert done.returncode == Outcome.BAD_INPUT, done.stderr
+    assert "Traceback" not in done.stderr
+    assert name in done.stderr
+    assert out.read_text() == "precious"
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_the_word_default_names_the_shipped_source() -> None:
+    assert isinstance(read("default"), AnimatableFace)
