@@ -8,7 +8,7 @@ from typing import Any
 
 from fba.findings import Finding
 from fba.scene import Shape, Transform
-from formats.vrml97.tree import Field, Nodes, Numbers, Proto, Raw, Statement, Strings, Use, VrmlNode
+from formats.vrml97.tree import BodyItem, Field, Nodes, Proto, Raw, Statement, Strings, Use, VrmlNode, definitions
 
 METADATA_DEF = "fba_toolkit"
 """DEF name of the WorldInfo that carries what the standard's nodes cannot say."""
@@ -48,10 +48,22 @@ class Split:
 
 def split(statements: tuple[Statement, ...]) -> Split:
     """Take Face nodes, declarations of MPEG-4 nodes, BT descriptors and the toolkit's WorldInfo out of a file."""
-    faces: list[VrmlNode] = []
-    strings: list[str] = []
+    top = _lifted(statements)
+    without = _Splitter(None)
+    elsewhere = definitions(without.outside(top))
+    splitter = _Splitter(frozenset(elsewhere))
+    return Split(tuple(splitter.outside(top)), tuple(splitter.faces), tuple(splitter.strings))
 
-    def outside(items: Iterable[Any]) -> list[Any]:
+
+class _Splitter:
+    """elsewhere : DEF names outside all Face nodes; None to leave out what Face nodes hold."""
+
+    def __init__(self, elsewhere: frozenset[str] | None) -> None:
+        self.elsewhere = elsewhere
+        self.faces: list[VrmlNode] = []
+        self.strings: list[str] = []
+
+    def outside(self, items: Iterable[Any]) -> list[Any]:
         out: list[Any] = []
         for item in items:
             if isinstance(item, Raw) or (isinstance(item, Proto) and item.name in MPEG4_NODES):
@@ -59,50 +71,45 @@ def split(statements: tuple[Statement, ...]) -> Split:
             if not isinstance(item, VrmlNode):
                 out.append(item)
             elif item.type == "Face":
-                faces.append(item)
-                out.extend(outside(_scene_graph(item)))
+                self.faces.append(item)
+                out.extend(self.scene_graph(item))
             elif item.def_name == METADATA_DEF and item.type == "WorldInfo":
                 info = item.get("info")
-                strings.extend(info.values if isinstance(info, Strings) else ())
+                self.strings.extend(info.values if isinstance(info, Strings) else ())
             else:
-                out.append(_without_faces(item))
+                out.append(self.without_faces(item))
         return out
 
-    def _without_faces(item: VrmlNode) -> VrmlNode:
-        body = []
+    def without_faces(self, item: VrmlNode) -> VrmlNode:
+        body: list[BodyItem] = []
         for part in item.body:
             if isinstance(part, Field) and isinstance(part.value, Nodes) and any(part.value.items):
-                items = outside(part.value.items)
+                items = self.outside(part.value.items)
                 part = Field(part.name, Nodes(tuple(items), part.value.many or len(items) != 1))
             body.append(part)
         return replace(item, body=tuple(body))
 
-    kept = outside(_lifted(statements))
-    return Split(tuple(kept), tuple(faces), tuple(strings))
-
-
-def _scene_graph(face: VrmlNode) -> tuple[VrmlNode | Use, ...]:
-    fdp = next((n for n in face.nodes("fdp") if isinstance(n, VrmlNode)), None)
-    return () if fdp is None else fdp.nodes("faceSceneGraph")
+    def scene_graph(self, face: VrmlNode) -> list[Any]:
+        """What a Face draws and nothing outside it holds already."""
+        if self.elsewhere is None:
+            return []
+        fdp = next((n for n in face.nodes("fdp") if isinstance(n, VrmlNode)), None)
+        graph = () if fdp is None else fdp.nodes("faceSceneGraph")
+        own = [n for n in graph if not (isinstance(n, Use) and n.name in self.elsewhere)]
+        return self.outside(own)
 
 
 def _lifted(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
-    """BT has one top node: what its plain Group (or layer) holds counts as the top of the file."""
+    """BT has one top node: what its plain Group holds counts as the top of the file."""
     out: list[Statement] = []
     for item in statements:
         plain = isinstance(item, VrmlNode) and item.type == "Group" and item.def_name is None
-        if plain and isinstance(item, VrmlNode) and any(_is_face(n) for n in item.nodes("children")):
+        if plain and isinstance(item, VrmlNode) and any(_marks_top(n) for n in item.nodes("children")):
             out.extend(item.nodes("children"))
         else:
             out.append(item)
     return tuple(out)
 
 
-def _is_face(item: object) -> bool:
-    return isinstance(item, VrmlNode) and item.type == "Face"
-
-
-def flat_numbers(owner: VrmlNode, name: str) -> Numbers | None:
-    """A numeric field; None where it is absent or empty."""
-    value = owner.get(name)
-    return value if isinstance(value, Numbers) else None
+def _marks_top(item: VrmlNode | Use) -> bool:
+    return isinstance(item, VrmlNode) and (item.type == "Face" or item.def_name == METADATA_DEF)

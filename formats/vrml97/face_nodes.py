@@ -9,7 +9,7 @@ import numpy as np
 from fat.face import AnimatableFace
 from fat.tables import FaceDefMesh, FaceDefTable, FaceDefTables, FaceDefTransform, TransformField
 from fba.arrays import Floats, Ints
-from fba.errors import FaceDefTablesError, FbaError
+from fba.errors import FaceDefTablesError, FbaError, LandmarkError
 from fba.faps import EXPRESSION_FAP, LOW_LEVEL_FAPS, VISEME_FAP, fap
 from fba.feature_points import standard_feature_points
 from fba.scene import FaceScene, Frame
@@ -70,6 +70,10 @@ def face_node(face: AnimatableFace, def_names: Mapping[str, str], scene_graph: N
 
 def _calibration_points(face: AnimatableFace) -> Floats:
     """(84, 3) positions of the standard's points in the file's axes, MISSING where there is none."""
+    shapes = {s.name for s in face.scene.shapes}
+    for key, point in face.feature_points.items():
+        if point.shape is not None and point.shape not in shapes:
+            raise LandmarkError(f"feature point {key} lies on '{point.shape}', which is not in the scene")
     positions = face.feature_points.positions(face.scene)
     frame = face.scene.frame
     rows = [frame.to_file(positions[i]) if i in positions else [MISSING] * 3 for i in standard_feature_points()]

@@ -53,7 +53,6 @@ _string = re.compile(r'"([^"\\]*+(?:\\.[^"\\]*+)*+)"', re.DOTALL)
 _escape = re.compile(r"\\(.)", re.DOTALL)
 _word = re.compile(r"[^\x00-\x20,#\"{}\[\]]++")
 _brace_part = re.compile(r'[^{}"#]++|"(?:[^"\\]|\\.)*+"|#[^\n]*+', re.DOTALL)
-_MAX_DIGITS = 400
 _CHUNK = 1 << 21
 
 _ACCESS = frozenset({"field", "exposedField", "eventIn", "eventOut"})
@@ -220,11 +219,11 @@ class _Parser:
         self.pos += len("ROUTE")
         ends = []
         for last in (False, True):
+            self.skip()
             start = self.pos
             name = self.def_name("NODE.event")
             owner, dot, event = name.rpartition(".")
             if not dot or not owner or not event:
-                self.skip()
                 raise self.fail(f"expected NODE.event in a ROUTE, found {name[:40]!r}", start)
             ends.append((owner, event))
             if not last:
@@ -453,11 +452,8 @@ class _Parser:
         unsigned = word.lstrip("+-")
         if unsigned == "I":
             return float("-inf") if word[0] == "-" else float("inf")
-        if len(word) <= _MAX_DIGITS:
-            try:
-                if unsigned[:2] in ("0x", "0X"):
-                    return float(int(word, 16))
-                return float(word)
-            except (ValueError, OverflowError):
-                pass
-        raise self.expected("a number", self.text.find(word, start))
+        try:
+            return float(int(word, 16)) if unsigned[:2] in ("0x", "0X") else float(word)
+        except (ValueError, OverflowError):
+            place = re.search(rf"(?<![^\s,\[]){re.escape(word)}{_END}", self.text[start:])
+            raise self.expected("a number", start + (place.start() if place else 0)) from None

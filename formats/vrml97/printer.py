@@ -31,6 +31,9 @@ _PER_LINE = 12
 _EXACT_POWER = 22
 """10**22 is the largest power of ten that float64 holds exactly."""
 
+_MOST_DIGITS = 9
+"""Decimal digits that always tell two float32 apart."""
+
 
 def print_tree(statements: tuple[Statement, ...], *, bt: bool = False) -> str:
     """Write statements as text, without a header.
@@ -177,22 +180,20 @@ def shortest_float32(values: Floats32) -> Floats:
     0.1
     """
     flat = np.asarray(values, dtype=np.float32).reshape(-1)
-    exact = flat.astype(np.float64)
-    out = exact.copy()
-    todo = np.flatnonzero(np.isfinite(exact) & (exact != 0))
-    if not todo.size:
-        return out
-    exponent = np.floor(np.log10(np.abs(exact[todo]))).astype(np.int64)
-    for digits in range(1, 10):
+    out = flat.astype(np.float64)
+    todo = np.flatnonzero(np.isfinite(out) & (out != 0))
+    exponent = np.floor(np.log10(np.abs(out[todo]))).astype(np.int64)
+    direct = (exponent <= _EXACT_POWER) & (exponent >= _MOST_DIGITS - _EXACT_POWER)
+    rest = todo[~direct]
+    todo, exponent = todo[direct], exponent[direct]
+    for digits in range(1, _MOST_DIGITS + 1):
         shift = digits - 1 - exponent
-        usable = np.abs(shift) <= _EXACT_POWER
-        power = 10.0 ** np.where(usable, np.abs(shift), 0)
-        x = exact[todo]
-        up = shift >= 0
-        short = np.where(up, np.rint(x * power) / power, np.rint(x / power) * power)
-        fits = usable & (short.astype(np.float32) == flat[todo])
+        power = 10.0 ** np.abs(shift)
+        x = flat[todo].astype(np.float64)
+        short = np.where(shift >= 0, np.rint(x * power) / power, np.rint(x / power) * power)
+        fits = short.astype(np.float32) == flat[todo]
         out[todo[fits]] = short[fits]
         todo, exponent = todo[~fits], exponent[~fits]
-    for k in todo:
+    for k in (*rest, *todo):
         out[k] = float(str(flat[k]))
     return out

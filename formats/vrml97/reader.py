@@ -120,7 +120,7 @@ def _face(
     notes = dict(metadata.notes)
     fapu = metadata.fapu
     if fapu is None:
-        fapu, missing = _measured(points.positions(scene))
+        fapu, missing = _measured(positions)
         if missing:
             notes["fapu"] = message = f"not measurable: {missing}; one unit of length is taken for each"
             findings.append(Finding("warning", "fapu", message))
