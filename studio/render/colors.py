@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,8 +23,8 @@ NATURAL: dict[Role, tuple[float, float, float]] = {
 }
 BY_NAME: tuple[tuple[str, tuple[float, float, float]], ...] = (
     ("lash|brow|hair|beard", (0.20, 0.15, 0.12)),
-    ("gum|mouth|palate", (0.74, 0.42, 0.41)),
-    ("sclera|eyeball", (0.95, 0.945, 0.93)),
+    ("gum|palate|mouth[ _-]?(bag|socket|cavity|inside)", (0.74, 0.42, 0.41)),
+    ("sclera|eyeball|eyes?[ _-]?(left|right|l|r)?$", (0.95, 0.945, 0.93)),
     ("iris", (0.36, 0.49, 0.57)),
     ("pupil", (0.04, 0.04, 0.05)),
     ("tooth|teeth", (0.94, 0.91, 0.84)),
@@ -47,8 +48,19 @@ GLOSS = {
 }
 IRIS_ANGLE = 0.52
 """Half angle of a human iris (11.8 mm across) on its eyeball (24 mm across): asin(0.49)."""
+NAMED = (Role.SKIN, Role.OTHER)
+"""Roles of shapes in which one mesh may hold several parts, told apart by names of groups or materials."""
 EYES = (Role.EYE_LEFT, Role.EYE_RIGHT)
 _PLAIN = Material().diffuse
+
+
+def with_skin(scene: FaceScene) -> tuple[Shape, ...]:
+    """The scene's shapes; where none is known to be the skin, the largest one without a role is taken for it."""
+    unknown = [s for s in scene.shapes if s.role is Role.OTHER]
+    if scene.with_role(Role.SKIN) or not unknown:
+        return scene.shapes
+    largest = max(unknown, key=lambda s: s.mesh.face_count)
+    return tuple(replace(s, role=Role.SKIN) if s is largest else s for s in scene.shapes)
 
 
 def shape_colors(shape: Shape) -> Floats:
@@ -59,8 +71,8 @@ def shape_colors(shape: Shape) -> Floats:
         ids = np.where(mesh.face_materials >= 0, mesh.face_materials, len(shape.materials))
         used = np.unique(ids)
         return table[used[0]] if used.size == 1 else table[ids][mesh.triangle_faces]
-    if mesh.face_groups is not None and mesh.group_names and shape.role is Role.OTHER:
-        table = np.array([natural_color(Role.OTHER, name) for name in mesh.group_names])
+    if mesh.face_groups is not None and mesh.group_names and shape.role in NAMED:
+        table = np.array([natural_color(shape.role, name) for name in mesh.group_names])
         ids = np.clip(mesh.face_groups, 0, len(table) - 1)
         return table[ids][mesh.triangle_faces]
     if len(shape.materials) == 1:
@@ -73,13 +85,13 @@ def material_color(material: Material, shape: Shape) -> tuple[float, float, floa
     red, green, blue = material.diffuse
     says_nothing = material.diffuse == _PLAIN or (min(material.diffuse) > 0.99) or max(material.diffuse) < 0.01
     if says_nothing:
-        return natural_color(shape.role, f"{shape.name} {material.name}")
+        return natural_color(shape.role, material.name or shape.name)
     return red, green, blue
 
 
 def natural_color(role: Role, name: str) -> tuple[float, float, float]:
-    """Colour by role; for a part without role by its name."""
-    if role is Role.OTHER:
+    """Colour by role; for a part of the skin or without role by its name, where that tells."""
+    if role in NAMED:
         for pattern, color in BY_NAME:
             if re.search(pattern, name, re.IGNORECASE):
                 return color

@@ -14,7 +14,7 @@ from fba.feature_points import FeaturePoints
 from fba.scene import FaceScene, Role, Shape
 from studio.render.camera import Camera, frame_face
 from studio.render.choice import make_renderer
-from studio.render.colors import EYES, GLOSS, clear_faces, eye_iris, is_clear, opacity, shape_colors
+from studio.render.colors import EYES, GLOSS, clear_faces, eye_iris, is_clear, opacity, shape_colors, with_skin
 from studio.render.drawable import Decal, Drawable, Iris, same_place, smooth_normals
 from studio.render.features import feature_decal
 from studio.render.occlusion import ambient_occlusion
@@ -35,7 +35,7 @@ class Style:
     ----------
     smooth : shade smoothly over edges; False shows every polygon flat.
     occlusion : darken folds and hollows (measured on the neutral face).
-    features : paint brows and lips where the feature points are, on skin of one colour.
+    features : paint brows and lips where the feature points are.
     natural : ignore the file's materials and take natural colours.
     """
 
@@ -76,7 +76,7 @@ class Figure:
         self.style = style or Style()
         self.camera = frame_face(scene, points)
         self.neutral = {s.name: scene.world_vertices(s.name) for s in scene.shapes}
-        self._parts = [part for s in scene.shapes if (part := _part(scene, s, self.style)) is not None]
+        self._parts = [part for s in with_skin(scene) if (part := _part(scene, s, self.style)) is not None]
         if self.style.features and points is not None:
             self._parts = self._painted(points)
         if self.style.occlusion and self._parts:
@@ -116,7 +116,7 @@ class Figure:
         brows = not any(re.search("brow", p.shape.name, re.IGNORECASE) for p in self._parts)
         out = []
         for part in self._parts:
-            if part.shape.role is Role.SKIN and part.color.ndim == 1:
+            if part.shape.role is Role.SKIN:
                 decal = feature_decal(places, self.neutral[part.shape.name], part.triangles, brows)
                 part = replace(part, decal=decal)
             out.append(part)
@@ -135,7 +135,7 @@ def _part(scene: FaceScene, shape: Shape, style: Style) -> _Part | None:
         return None
     dressed = shape
     if style.natural:
-        dressed = Shape(shape.name, shape.mesh, shape.role, (), shape.vertex_ids)
+        dressed = replace(shape, materials=())
     color, triangles = shape_colors(dressed), shape.mesh.triangles
     hidden = clear_faces(shape)
     if hidden is not None:

@@ -95,6 +95,15 @@ def test_colours_come_from_role_name_or_material() -> None:
     assert tuple(shape_colors(shape(Role.SKIN, materials=(Material("default"),)))) == NATURAL[Role.SKIN]
 
 
+def test_largest_shape_without_role_is_taken_for_skin_where_there_is_none() -> None:
+    big = PolyMesh.from_faces(CORNERS, [[0, 1, 2], [0, 2, 3]])
+    scene = FaceScene((shape(name="bolt"), Shape("figure_12", big)))
+    assert [d.color.tolist() for d in Figure(scene, style=Style(occlusion=False)).drawables()] == [
+        list(NATURAL[Role.OTHER]),
+        list(NATURAL[Role.SKIN]),
+    ]
+
+
 def test_faces_of_several_materials_keep_their_own_colours() -> None:
     mesh = PolyMesh(
         np.array([*CORNERS, [3.0, 1.0, 0.0], [3.0, -1.0, 0.0]]),
@@ -106,6 +115,21 @@ def test_faces_of_several_materials_keep_their_own_colours() -> None:
     colors = shape_colors(Shape("eye", mesh, Role.EYE_LEFT, (red, blue)))
     assert colors.tolist() == [list(blue.diffuse)] * 2 + [list(red.diffuse)] * 2
     assert eye_iris(FaceScene((Shape("eye", mesh, Role.EYE_LEFT),)), Shape("eye", mesh, Role.EYE_LEFT), colors) is None
+
+
+def test_parts_of_one_mesh_are_told_apart_by_names_of_groups_and_materials() -> None:
+    vertices = np.array([*CORNERS, [3.0, 1.0, 0.0], [3.0, -1.0, 0.0]])
+    corners, offsets, kinds = np.array([0, 1, 2, 3, 1, 5, 4, 2]), np.array([0, 4, 8]), np.array([0, 1])
+    grouped = PolyMesh(vertices, corners, offsets, face_groups=kinds, group_names=("Head", "EyeLeft"))
+    dressed = PolyMesh(vertices, corners, offsets, face_materials=kinds)
+    shapes = (
+        Shape("all", grouped, Role.SKIN),
+        Shape("all", dressed, Role.SKIN, (Material("M_Face"), Material("M_ScleraLeft"))),
+    )
+    for one in shapes:
+        skin, eye = shape_colors(one)[[0, 2]]
+        assert tuple(skin) == NATURAL[Role.SKIN]
+        assert tuple(eye) == NATURAL[Role.EYE_LEFT]
 
 
 def test_films_over_the_eye_are_not_drawn_and_lashes_are_thin() -> None:
