@@ -7,6 +7,7 @@ beyond the last, which is what the standard says of a FaceDefMesh.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from fba.faps import fap
 from fba.fapu import Fapu
 from formats.usd.axes import StageAxes
 from formats.usd.names import Namer
+from formats.usd.normals import SmoothNormals
 from formats.usd.properties import ints, need, put, put_array, rows, to_single, vt
 
 AGREEMENT = 1e-5
@@ -30,8 +32,10 @@ AGREEMENT = 1e-5
 class MeshTargets:
     """Collects the blend shapes of one mesh and binds them to it."""
 
-    def __init__(self, mesh: Usd.Prim, namer: Namer) -> None:
+    def __init__(self, mesh: Usd.Prim, namer: Namer, axes: StageAxes, normals: SmoothNormals | None) -> None:
         self.mesh = mesh
+        self._axes = axes
+        self._normals = normals
         self._namer = namer
         self._tokens: list[str] = []
         self._paths: list[Sdf.Path] = []
@@ -41,22 +45,36 @@ class MeshTargets:
         """Names of the blend shapes so far, as a SkelAnimation has to list them."""
         return tuple(self._tokens)
 
-    def add(self, name: str, index: Ints, offsets: NDArray[np.float32]) -> UsdSkel.BlendShape:
+    def add(
+        self, name: str, index: Ints, full: Floats, between: Mapping[str, tuple[float, Floats]] | None = None
+    ) -> UsdSkel.BlendShape:
         """Author a blend shape.
 
         Parameters
         ----------
         index : (k,) vertices that move.
-        offsets : (k, 3) at weight 1, stage axes.
+        full : (k, 3) offsets at weight 1; inside axes, local coordinates of the mesh.
+        between : name of an inbetween -> its weight and its offsets.
         """
         token = self._namer.name(name)
         path = self.mesh.GetPath().AppendChild(token)
         shape = UsdSkel.BlendShape.Define(self.mesh.GetStage(), path)
-        shape.CreateOffsetsAttr(vt(offsets))
+        shape.CreateOffsetsAttr(self._stage_vectors(full))
         shape.CreatePointIndicesAttr(vt(index))
+        if self._normals is not None:
+            shape.CreateNormalOffsetsAttr(self._stage_vectors(self._normals.offsets(index, full)))
+        for label, (weight, offsets) in (between or {}).items():
+            inbetween = shape.CreateInbetween(label)
+            inbetween.SetWeight(weight)
+            inbetween.SetOffsets(self._stage_vectors(offsets))
+            if self._normals is not None:
+                inbetween.SetNormalOffsets(self._stage_vectors(self._normals.offsets(index, offsets)))
         self._tokens.append(token)
         self._paths.append(path)
         return shape
+
+    def _stage_vectors(self, values: Floats) -> Any:
+        return vt(to_single(self._axes.vectors(values)))
 
     def bind(self, skeleton: Sdf.Path) -> None:
         """Tell the mesh its blend shapes and the skeleton whose animation drives them."""
@@ -78,14 +96,14 @@ def write_face_def_mesh(
     """Author one FaceDefMesh as a blend shape; its slopes are kept exactly beside the offsets."""
     full = full_value(mesh.interval_borders)
     places = _inbetween_borders(mesh.interval_borders, full)
-    offsets = _offsets(mesh, [full, *places], fapu.unit(fap(table.fap_id).unit), axes)
-    if not np.all(np.isfinite(offsets)):
+    offsets = _accumulated(mesh, [full, *places], fapu.unit(fap(table.fap_id).unit))
+    if not np.all(np.isfinite(to_single(offsets))):
         raise FaceDefTablesError(f"{table.name} moves '{mesh.shape}' further than 32-bit numbers can say")
-    shape = targets.add(table.name, mesh.coord_index, offsets[0])
-    for border, values in zip(places, offsets[1:], strict=True):
-        inbetween = shape.CreateInbetween(f"at_{border}".replace("-", "minus_"))
-        inbetween.SetWeight(border / full)
-        inbetween.SetOffsets(vt(values))
+    between = {
+        f"at_{border}".replace("-", "minus_"): (border / full, values)
+        for border, values in zip(places, offsets[1:], strict=True)
+    }
+    shape = targets.add(table.name, mesh.coord_index, offsets[0], between)
     prim = shape.GetPrim()
     put(prim, "fapID", Sdf.ValueTypeNames.Int, table.fap_id)
     put(prim, "highLevelSelect", Sdf.ValueTypeNames.Int, table.high_level_select)
@@ -99,11 +117,11 @@ def _inbetween_borders(borders: Ints, full: int) -> list[int]:
     return [int(b) for b in borders if b not in (0, full)]
 
 
-def _offsets(mesh: FaceDefMesh, values: list[int], unit: float, axes: StageAxes) -> NDArray[np.float32]:
-    """Accumulated displacements (v, k, 3) at FAP values, stage axes."""
+def _accumulated(mesh: FaceDefMesh, values: list[int], unit: float) -> Floats:
+    """Accumulated displacements (v, k, 3) at FAP values; inside axes, local coordinates."""
     weights = interval_weights(mesh.interval_borders, values) * unit
-    places = np.einsum("vj,kjc->vkc", weights, mesh.displacements.astype(np.float64))
-    return to_single(axes.vectors(places))
+    places: Floats = np.einsum("vj,kjc->vkc", weights, mesh.displacements.astype(np.float64))
+    return places
 
 
 def read_face_def_mesh(prim: Usd.Prim, shape: str, fap_id: int, fapu: Fapu, axes: StageAxes) -> FaceDefMesh:
@@ -128,7 +146,7 @@ def read_face_def_mesh(prim: Usd.Prim, shape: str, fap_id: int, fapu: Fapu, axes
     try:
         if slopes.size == index.size * (borders.size - 1) * 3:
             mesh = FaceDefMesh(shape, borders, index, _inside(slopes.reshape(index.size, -1, 3), axes))
-            again = _offsets(mesh, values, unit, axes)
+            again = axes.vectors(_accumulated(mesh, values, unit))
             if np.abs(again - stored).max(initial=0.0) <= AGREEMENT * np.abs(stored).max(initial=0.0):
                 return mesh
         return FaceDefMesh(shape, borders, index, _inside(_slopes(borders, values, stored, unit), axes))

@@ -16,6 +16,7 @@ from fba.scene import Role, Shape
 from formats.usd.axes import StageAxes
 from formats.usd.materials import UV_PRIMVAR, MaterialLibrary, read_material
 from formats.usd.names import Namer
+from formats.usd.normals import DERIVED, SmoothNormals
 from formats.usd.properties import (
     get,
     get_twin,
@@ -35,8 +36,15 @@ MATERIAL_FAMILY = "materialBind"
 GROUP_FAMILY = "faceGroups"
 
 
-def write_mesh(stage: Usd.Stage, path: Sdf.Path, shape: Shape, axes: StageAxes, library: MaterialLibrary) -> Namer:
-    """Author a shape; return what hands out the names of further prims below it."""
+def write_mesh(
+    stage: Usd.Stage,
+    path: Sdf.Path,
+    shape: Shape,
+    axes: StageAxes,
+    library: MaterialLibrary,
+    smooth: SmoothNormals | None,
+) -> Namer:
+    """Author a shape, with smooth normals if it has none; return what hands out the names of prims below it."""
     mesh = shape.mesh
     prim = UsdGeom.Mesh.Define(stage, path)
     points = axes.vectors(mesh.vertices)
@@ -50,6 +58,10 @@ def write_mesh(stage: Usd.Stage, path: Sdf.Path, shape: Shape, axes: StageAxes, 
     _write_primvar(prim, UV_PRIMVAR, Sdf.ValueTypeNames.TexCoord2fArray, mesh.texcoords, mesh.texcoord_indices)
     normals = None if mesh.normals is None else axes.vectors(mesh.normals)
     _write_primvar(prim, "normals", Sdf.ValueTypeNames.Normal3fArray, normals, mesh.normal_indices)
+    if smooth is not None:
+        prim.CreateNormalsAttr(vt(to_single(axes.vectors(smooth.rest))))
+        prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+        put(prim.GetPrim(), DERIVED, Sdf.ValueTypeNames.Bool, True)
     put(prim.GetPrim(), "role", Sdf.ValueTypeNames.Token, shape.role.value)
     if shape.vertex_ids is not None:
         put_array(prim.GetPrim(), "vertexIds", shape.vertex_ids)
@@ -196,7 +208,7 @@ def _read_normals(mesh: UsdGeom.Mesh, poly: PolyMesh, axes: StageAxes) -> tuple[
         values, indices = _read_primvar(mesh, primvar, 3, poly)
     else:
         found = value_of(mesh.GetNormalsAttr())
-        if found is None or not len(found) or get(mesh.GetPrim(), "derivedNormals"):
+        if found is None or not len(found) or get(mesh.GetPrim(), DERIVED):
             return None, None
         values = rows(found, 3).astype(np.float64)
         indices = _element_of_corner(mesh.GetNormalsInterpolation(), poly)

@@ -32,22 +32,21 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
             turn = _inverse(scene, shape.name).T
             for name, deltas in zip(shapes.names, shapes.deltas, strict=True):
                 inside: Floats = scene.frame.from_file(deltas[places[shape.name]]) @ turn
-                offsets = to_single(draft.axes.vectors(inside))
-                index = np.flatnonzero(np.any(offsets != 0.0, axis=1)).astype(np.int32)
+                index = np.flatnonzero(np.any(to_single(inside) != 0.0, axis=1)).astype(np.int32)
                 if index.size:
-                    put_name(own.add(name, index, offsets[index]).GetPrim(), name)
+                    put_name(own.add(name, index, inside[index]).GetPrim(), name)
             targets.append(own)
         bind_targets(draft, targets)
     save_layer(draft.layer, path)
 
 
 def _inverse(scene: FaceScene, name: str) -> Floats:
-    linear = scene.world_matrix(name)[:3, :3]
+    linear: Floats = scene.world_matrix(name)[:3, :3]
     try:
-        inverse: Floats = np.linalg.inv(linear)
+        inverse = np.linalg.inv(linear)
     except np.linalg.LinAlgError:
         raise MeshError(f"shape '{name}' is scaled to nothing by the transforms above it") from None
-    return inverse
+    return np.asarray(inverse, dtype=np.float64)
 
 
 def read_shapes(path: Path) -> ShapeSet | None:

@@ -143,8 +143,9 @@ def _blend_shape(prim: Usd.Prim) -> Iterator[Finding]:
         name = inbetween.GetAttr().GetName()
         weight = inbetween.GetWeight()
         values = len(inbetween.GetOffsets() or ())
-        if values != count:
-            text = f"{name} has {values} offsets for {count} points"
+        turned = len(inbetween.GetNormalOffsets() or ())
+        if values != count or turned not in (0, count):
+            text = f"{name} has {values} offsets and {turned} normal offsets for {count} points"
             yield Finding("error", "usd-offsets-count", text, where)
         if weight is None or weight in (0.0, 1.0) or weight in weights:
             text = f"{name} has the weight {weight}; every inbetween needs its own, and neither 0 nor 1"

@@ -19,6 +19,7 @@ from formats.usd.facts import write_facts
 from formats.usd.materials import MaterialLibrary
 from formats.usd.meshes import write_mesh
 from formats.usd.names import Namer, node_paths, put_name
+from formats.usd.normals import SmoothNormals
 from formats.usd.properties import put, put_string, put_targets
 from formats.usd.stages import quiet, save_layer
 from formats.usd.xforms import write_transform
@@ -35,6 +36,7 @@ class Draft:
     ----------
     paths : name of a scene node -> its prim.
     namers : name of a shape -> what hands out the names of prims below it.
+    normals : name of a shape -> the normals that it was given; None where it has its own.
     """
 
     layer: Sdf.Layer
@@ -43,10 +45,12 @@ class Draft:
     axes: StageAxes
     paths: dict[str, Sdf.Path]
     namers: dict[str, Namer]
+    normals: dict[str, SmoothNormals | None]
 
     def targets(self, shape: str) -> MeshTargets:
         """Where the blend shapes of a shape go."""
-        return MeshTargets(self.stage.GetPrimAtPath(self.paths[shape]), self.namers[shape])
+        prim = self.stage.GetPrimAtPath(self.paths[shape])
+        return MeshTargets(prim, self.namers[shape], self.axes, self.normals[shape])
 
 
 def write_usd(face: FaceScene | AnimatableFace, path: Path) -> None:
@@ -74,13 +78,16 @@ def start(scene: FaceScene, root_type: str) -> Draft:
     paths = node_paths(scene, root.GetPath())
     library = MaterialLibrary(stage, root.GetPath().AppendChild("Materials"))
     namers: dict[str, Namer] = {}
+    normals: dict[str, SmoothNormals | None] = {}
     for node, _ in scene.walk():
         if isinstance(node, Shape):
-            namers[node.name] = write_mesh(stage, paths[node.name], node, axes, library)
+            smooth = SmoothNormals(node.mesh) if node.mesh.normal_indices is None else None
+            namers[node.name] = write_mesh(stage, paths[node.name], node, axes, library, smooth)
+            normals[node.name] = smooth
         else:
             write_transform(stage.DefinePrim(paths[node.name], "Xform"), node, axes)
         put_name(stage.GetPrimAtPath(paths[node.name]), node.name)
-    return Draft(layer, stage, root, axes, paths, namers)
+    return Draft(layer, stage, root, axes, paths, namers, normals)
 
 
 def bind_targets(draft: Draft, targets: list[MeshTargets]) -> None:

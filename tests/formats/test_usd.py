@@ -155,6 +155,31 @@ def test_baking_the_skinning_keeps_the_neutral_face_and_plays_the_weights(tmp_pa
         assert np.allclose(points.Get(10), pose.local[shape], atol=1e-5)
 
 
+@pytest.mark.parametrize("axes", [np.eye(3), Z_UP])
+def test_normals_turn_with_the_blend_shapes(tmp_path: Path, axes: np.ndarray) -> None:
+    face = small_face(Frame(axes))
+    path = tmp_path / "face.usdc"
+    usd.write(face, path)
+    stage = Usd.Stage.Open(str(path))
+    skin = UsdGeom.Mesh(_prim(stage, "skin"))
+    assert skin.GetNormalsInterpolation() == "vertex"
+    mesh = face.scene.shape("skin").mesh
+    rest = np.array(skin.GetNormalsAttr().Get())
+    assert np.allclose(rest, mesh.vertex_normals() @ axes, atol=1e-6)
+    assert np.allclose(np.linalg.norm(rest, axis=1), 1.0)
+    player = Player(face)
+    for name, fap_id, values in (("open_jaw", 3, (1080, 400)), ("raise_b_midlip", 5, (600, -400, -1860))):
+        blend = UsdSkel.BlendShape(_prim(stage, "skin").GetChild(name))
+        index = np.array(blend.GetPointIndicesAttr().Get())
+        between = {i.GetAttr().GetBaseName(): i for i in blend.GetInbetweens()}
+        for value in values:
+            label = f"at_{value}".replace("-", "minus_")
+            stored = between[label].GetNormalOffsets() if label in between else blend.GetNormalOffsetsAttr().Get()
+            moved = mesh.vertex_normals(player.pose({fap_id: value}).local["skin"]) @ axes
+            assert np.abs(np.array(stored)).max() > 0.01
+            assert np.allclose(rest[index] + np.array(stored), moved[index], atol=1e-5)
+
+
 def _rich_scene() -> FaceScene:
     """What small_face leaves out: normals, corners without uv, faces without a group, odd names and transforms."""
     mesh = PolyMesh.from_faces(np.random.default_rng(2).normal(size=(5, 3)) / 3, [[0, 1, 2], [0, 2, 3, 4]])
