@@ -27,6 +27,9 @@ HighLevel = Literal["add", "high_only"]
 BATCH_FRAMES = 64
 """Frames evaluated in one go; 20,000 vertices then take 31 MB."""
 
+_ROW = 64
+"""Vertices whose coordinates are shifted as one row; see `_move_frames`."""
+
 
 @dataclass(frozen=True, eq=False)
 class Pose:
@@ -129,13 +132,7 @@ class Player:
             out = self._world_deformer(self._plan.weights(values))
             for name, motion in self._chains.motions(values).items():
                 relative = motion.matrices @ self._chains.rest_inverse(name)
-                place = _place(self._order[name])
-                rows = slice(None) if motion.moving.all() else np.flatnonzero(motion.moving)
-                vertices = out[:, place]
-                turned = vertices[rows] @ relative[rows, :3, :3].transpose(0, 2, 1)
-                vertices[rows] = turned + relative[rows, None, :3, 3]
-                if not isinstance(place, slice):
-                    out[:, place] = vertices
+                _move_frames(out, _place(self._order[name]), relative, np.flatnonzero(motion.moving).tolist())
             yield out
 
     def _poses(self, values: Floats) -> Iterator[Pose]:
@@ -243,6 +240,24 @@ def _place(ids: Ints) -> slice | Ints:
     if ids.size and np.array_equal(ids, np.arange(ids[0], ids[0] + ids.size)):
         return slice(int(ids[0]), int(ids[0]) + ids.size)
     return ids
+
+
+def _move_frames(out: Floats, place: slice | Ints, matrices: Floats, frames: list[int]) -> None:
+    """Transform the vertices at `place` in these frames of out (f, n, 3) by matrices (f, 4, 4), in place.
+
+    Written for speed, as a turning head moves every vertex: one frame at a time stays in the processor's cache,
+    and numpy adds long rows several times as fast as rows of three.
+    """
+    buffer = np.empty_like(out[0, place])
+    long = buffer.shape[0] // _ROW * _ROW
+    rows = buffer[:long].reshape(-1, 3 * _ROW)
+    linear = np.ascontiguousarray(matrices[:, :3, :3].transpose(0, 2, 1))
+    shift = np.tile(matrices[:, :3, 3], (1, _ROW))
+    for frame in frames:
+        np.matmul(out[frame, place], linear[frame], out=buffer)
+        rows += shift[frame]
+        buffer[long:] += shift[frame, :3]
+        out[frame, place] = buffer
 
 
 def _transformed(vertices: Floats, matrix: Floats) -> Floats:

@@ -113,7 +113,7 @@ def strip(name: str, count: int, seed: int, **more: object) -> Shape:
     return Shape(name, PolyMesh.from_faces(vertices, [[i, i + 1, i + 2] for i in range(count - 2)]), **more)
 
 
-def turned_scene(skin: int = 40, eye: int = 12) -> FaceScene:
+def turned_scene(skin: int = 80, eye: int = 12) -> FaceScene:
     """Skin and an eye, under transforms with every field in use."""
     socket = Transform(
         "socket",

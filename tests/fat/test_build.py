@@ -64,11 +64,11 @@ def test_high_level_tables_have_the_unit_one() -> None:
 
 def test_still_vertices_are_left_out_but_small_motions_keep_theirs() -> None:
     scene = FaceScene((turned_scene().shapes[0],))
-    offsets = np.zeros((40, 3))
+    offsets = np.zeros((80, 3))
     offsets[:4, 1] = [0.1, 5e-6, 7e-6, 1e-9]
     (table,) = build_tables(scene, FAPU, [FaceMotion("m", 3, 1, 1080, {"skin": offsets})])
     assert table.meshes[0].coord_index.tolist() == [0, 2]
-    small = np.zeros((40, 3))
+    small = np.zeros((80, 3))
     small[:4, 2] = [1e-4, 2e-6, 2e-8, 5e-9]
     (table,) = build_tables(scene, FAPU, [FaceMotion("m", 3, 1, 1, {"skin": small})])
     assert table.meshes[0].coord_index.tolist() == [0, 1, 2], "relative to the motion where that is smaller"
@@ -100,12 +100,12 @@ def test_angles_use_the_angle_unit() -> None:
         ({"value": 0}, "value 0"),
         ({"offsets": {"nose": np.zeros((4, 3))}}, "no shape 'nose'"),
         ({"offsets": {"skin": np.zeros((4, 3))}}, "offsets of shape"),
-        ({"offsets": {"skin": np.full((40, 3), np.nan)}}, "not finite"),
-        ({"offsets": {"skin": np.full((40, 3), 1e300)}}, "too large"),
+        ({"offsets": {"skin": np.full((80, 3), np.nan)}}, "not finite"),
+        ({"offsets": {"skin": np.full((80, 3), 1e300)}}, "too large"),
     ],
 )
 def test_bad_motions_are_refused(change: dict, words: str) -> None:
-    fields = {"name": "m", "fap_id": 3, "select": 1, "value": 1080, "offsets": {"skin": np.ones((40, 3))}, **change}
+    fields = {"name": "m", "fap_id": 3, "select": 1, "value": 1080, "offsets": {"skin": np.ones((80, 3))}, **change}
     with pytest.raises(FaceDefTablesError, match=words):
         build_tables(turned_scene(), FAPU, [FaceMotion(**fields)])
 

@@ -25,7 +25,7 @@ from fat.quality import (
     truth_error,
 )
 from fat.rig import rig_eye, rig_head
-from fat.tables import FaceDefTables, FaceDefTransform, TransformField
+from fat.tables import FaceDefTransform, TransformField
 from fba import FaceScene, Fapu, FeaturePoint, FeaturePoints, PolyMesh, Role, Shape, faps
 from fba.errors import MeshError
 from fba.feature_points import standard_feature_points
