@@ -150,9 +150,7 @@ def main() -> None:
     for frame in range(len(plain_stream)):
         plain_frame(face, plain_stream, frame)
     plain = len(plain_stream) / (time.perf_counter() - start)
-    print(
-        f"plain numpy loop over the tables, head at rest: {plain:,.0f} frames/s; the player is {speed / plain:.0f} times faster"
-    )
+    print(f"plain numpy loop over the tables, head at rest: {plain:,.0f} frames/s; player / loop = {speed / plain:.0f}")
     error = np.abs(first[0] - plain_frame(face, full_stream(1, head=False), 0)).max()
     print(f"largest difference between the two: {error:.1e} (radius 1)")
     print(f"peak memory of the process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
