@@ -37,6 +37,7 @@ class MeshTargets:
         self._axes = axes
         self._normals = normals
         self._namer = namer
+        self._token_namer = Namer()
         self._tokens: list[str] = []
         self._paths: list[Sdf.Path] = []
 
@@ -52,12 +53,12 @@ class MeshTargets:
 
         Parameters
         ----------
+        name : what animations know it by; the prim gets another one where that is taken by a subset.
         index : (k,) vertices that move.
         full : (k, 3) offsets at weight 1; inside axes, local coordinates of the mesh.
         between : name of an inbetween -> its weight and its offsets.
         """
-        token = self._namer.name(name)
-        path = self.mesh.GetPath().AppendChild(token)
+        path = self.mesh.GetPath().AppendChild(self._namer.name(name))
         shape = UsdSkel.BlendShape.Define(self.mesh.GetStage(), path)
         shape.CreateOffsetsAttr(self._stage_vectors(full))
         shape.CreatePointIndicesAttr(vt(index))
@@ -69,7 +70,7 @@ class MeshTargets:
             inbetween.SetOffsets(self._stage_vectors(offsets))
             if self._normals is not None:
                 inbetween.SetNormalOffsets(self._stage_vectors(self._normals.offsets(index, offsets)))
-        self._tokens.append(token)
+        self._tokens.append(self._token_namer.name(name))
         self._paths.append(path)
         return shape
 

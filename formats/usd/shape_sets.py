@@ -11,8 +11,8 @@ from fba.arrays import Floats
 from fba.errors import InputFileError, MeshError
 from fba.scene import FaceScene
 from fba.shapes import ShapeSet
-from formats.usd.names import name_of, put_name
-from formats.usd.properties import get, ints, put, rows, to_single
+from formats.usd.names import Namer, name_of
+from formats.usd.properties import get, ints, put, put_string, rows, to_single
 from formats.usd.reader import own_root, read_stage
 from formats.usd.stages import open_stage, quiet, reading, save_layer
 from formats.usd.writer import bind_targets, start
@@ -26,15 +26,18 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
     with quiet():
         draft = start(scene, "SkelRoot")
         put(draft.root, "shapeNames", Sdf.ValueTypeNames.StringArray, list(shapes.names))
+        # An animation knows shapes by their tokens, so one expression has the same token on every mesh.
+        namer = Namer()
+        tokens = [namer.name(name) for name in shapes.names]
         targets = []
         for shape in scene.shapes:
             own = draft.targets(shape.name)
             turn = _inverse(scene, shape.name).T
-            for name, deltas in zip(shapes.names, shapes.deltas, strict=True):
+            for name, token, deltas in zip(shapes.names, tokens, shapes.deltas, strict=True):
                 inside: Floats = scene.frame.from_file(deltas[places[shape.name]]) @ turn
                 index = np.flatnonzero(np.any(to_single(inside) != 0.0, axis=1)).astype(np.int32)
                 if index.size:
-                    put_name(own.add(name, index, inside[index]).GetPrim(), name)
+                    put_string(own.add(token, index, inside[index]).GetPrim(), "name", name)
             targets.append(own)
         bind_targets(draft, targets)
     save_layer(draft.layer, path)

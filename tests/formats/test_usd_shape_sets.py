@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faces import assert_same_scene, small_face, small_scene
+from pxr import Usd, UsdGeom, UsdSkel
 
 from fat.evaluate import Player
 from fba import FaceScene, Frame, PolyMesh, Shape, ShapeSet
 from fba.errors import InputFileError, MeshError
-from formats import usd
+from formats import read_scene, usd
+from formats.usd.validate import validate_stage
 
 Z_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 MIRRORED = np.diag([-1.0, 1.0, 1.0])
@@ -50,6 +52,48 @@ def test_the_files_own_vertex_order_is_kept(tmp_path: Path) -> None:
     assert found is not None
     assert np.array_equal(found.neutral, shapes.neutral)
     assert np.allclose(found.deltas, shapes.deltas, rtol=0, atol=1e-7)
+
+
+def test_an_expression_has_one_token_on_all_meshes(tmp_path: Path) -> None:
+    scene = small_scene()
+    neutral = scene.world_neutral()
+    deltas = np.zeros((3, *neutral.shape))
+    deltas[0, 0] = 1.0
+    deltas[1] = 1.0
+    deltas[2] = 2.0
+    shapes = ShapeSet(("a b", "a_b", "group_lower"), neutral, deltas)
+    usd.write_shape_set(scene, shapes, tmp_path / "names.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "names.usda"))
+    listed = {
+        p.GetName(): UsdSkel.BindingAPI(p).GetBlendShapesAttr().Get() for p in stage.Traverse() if p.IsA(UsdGeom.Mesh)
+    }
+    assert list(listed["skin"] or ()) == ["a_b", "a_b_2", "group_lower"]
+    assert list(listed["teeth"] or ()) == ["a_b_2", "group_lower"]
+    found = usd.read_shape_set(tmp_path / "names.usda")
+    assert found is not None
+    assert found.names == shapes.names
+    assert np.array_equal(found.deltas, deltas)
+    (tmp_path / "face.png").write_bytes(b"")
+    assert validate_stage(tmp_path / "names.usda") == []
+
+
+def test_real_expressions_read_back(tmp_path: Path, shared: Path) -> None:
+    scene = read_scene(shared / "faces" / "ict-facekit" / "generic_neutral_mesh.obj")
+    stored = np.load(shared / "faces" / "ict-facekit" / "expressions.npz")
+    names = tuple(str(n) for n in stored["names"][:12])
+    shapes = ShapeSet(names, scene.frame.to_file(scene.world_neutral()), stored["deltas"][:12].astype(np.float64))
+    path = tmp_path / "ict.usdc"
+    usd.write_shape_set(scene, shapes, path)
+    assert validate_stage(path) == []
+    found = usd.read_shape_set(path)
+    assert found is not None
+    assert found.names == names
+    assert np.array_equal(found.neutral, shapes.neutral)
+    largest = float(np.abs(shapes.deltas).max())
+    assert np.abs(found.deltas - shapes.deltas).max() <= 1e-6 * largest
+    again = usd.read(path)
+    assert isinstance(again, FaceScene)
+    assert_same_scene(again, scene)
 
 
 def test_the_tables_of_a_face_are_free_expressions_as_well(tmp_path: Path) -> None:
