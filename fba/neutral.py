@@ -29,9 +29,9 @@ CORNER_TOLERANCE = 50.0
 TEETH_TOLERANCE = 30.0
 """MNS/1024."""
 
-IRIS_SHARE = (0.38, 0.60)
-"""Lid opening / eyeball diameter at which lids pass for tangent to the iris: a human iris has 11.7 mm, an eyeball
-24 mm, which is 0.49."""
+IRIS_SHARE = (0.25, 0.65)
+"""Lid opening / eyeball diameter at which lids pass for tangent to the iris. A human iris has 11.7 mm, an eyeball
+24 mm, which is 0.49; the range leaves room for models with larger eyeballs (MakeHuman's have 30 mm: 0.29 to 0.34)."""
 
 IRIS_PER_EYE_SEPARATION = (0.12, 0.26)
 """The same against the eye separation (63 mm, so 0.19), for faces without eyeball shapes."""
