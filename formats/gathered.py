@@ -70,8 +70,9 @@ def gather_mesh(scene: FaceScene) -> GatheredMesh:
     for s in shapes:
         table = np.array([materials.setdefault(m, len(materials)) for m in s.materials] + [-1], dtype=np.int32)
         own = s.mesh.face_materials
-        # Without a list of its own, a shape wears its first material everywhere.
-        used.append(table[own] if own is not None else np.full(s.mesh.face_count, table[0], dtype=np.int32))
+        # Without a list of its own, a shape wears its first material everywhere; a number without one is none.
+        numbers = np.zeros(s.mesh.face_count, np.int32) if own is None else own
+        used.append(table[np.where(numbers < len(s.materials), numbers, -1)])
     mesh = PolyMesh(
         vertices,
         np.concatenate(corners),

@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 import re
 from bisect import bisect_right
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +18,11 @@ from fba.arrays import Bools, Floats, Ints
 from fba.errors import InputFileError, MeshError
 from fba.mesh import Material, PolyMesh
 from fba.scene import FaceScene, Shape
-from formats.files import read_bytes
+from formats.files import read_bytes, write_bytes
 from formats.mesh_document import MeshDocument
-from formats.mtl import find_materials
+from formats.mtl import find_materials, format_mtl
 from formats.names import unique_names
-from formats.obj_writer import write_obj
+from formats.obj_writer import ObjText, write_obj
 from formats.text_lines import TextLines
 
 _log = logging.getLogger(__name__)
@@ -121,15 +123,55 @@ def write(face: FaceScene | AnimatableFace, path: Path) -> None:
     Numbers are written so that they read back bit-identical. Tables do not fit into this format.
     """
     scene = face.scene if isinstance(face, AnimatableFace) else face
-    document = scene.document if isinstance(scene.document, ObjDocument) else None
-    write_obj(
-        scene,
-        Path(path),
-        polygons=None if document is None else (document.indices, document.offsets),
+    write_obj(scene, Path(path), **_own_order(scene))
+
+
+def write_series(like: FaceScene, folder: Path, positions: Iterable[tuple[str, Floats]]) -> None:
+    """Write NAME.obj into an existing folder for each (name, (N, 3) positions), all with the polygons of `like`.
+
+    Parameters
+    ----------
+    positions : file axes and the file's own vertex order. Stored normals no longer fit and are left out.
+
+    Raises
+    ------
+    OutputFileError
+        If a file cannot be written.
+    """
+    text = ObjText(like, "materials.mtl", **_own_order(like))
+    if text.gathered.materials:
+        write_bytes(folder / "materials.mtl", format_mtl(text.gathered.materials).encode())
+    for name, vertices in positions:
+        write_bytes(folder / f"{name}.obj", text.of(vertices, normals=False))
+
+
+def read_positions(path: Path) -> Floats:
+    """Read only the (N, 3) vertex positions of an OBJ file; errors as in `read`."""
+    lines = TextLines(read_bytes(path), path, continuations=True)
+    _blank_comments(lines)
+    is_vertex = lines.keyword_is(b"v")
+    if not is_vertex.any():
+        raise InputFileError(f"{path} holds no mesh: there is no vertex line 'v x y z' in it")
+    return _rows(lines, is_vertex, b"v", 3)[0]
+
+
+class _OwnOrder(TypedDict, total=False):
+    polygons: tuple[Ints, Ints]
+    objects: bool
+    colors: Floats | None
+
+
+def _own_order(scene: FaceScene) -> _OwnOrder:
+    """How the OBJ file that the scene came from had its polygons; nothing for scenes of other formats."""
+    document = scene.document
+    if not isinstance(document, ObjDocument):
+        return {}
+    return {
+        "polygons": (document.indices, document.offsets),
         # Shapes that were cut out later are no objects of the file.
-        objects=document is None or document.objects == tuple(s.name for s in scene.shapes),
-        colors=None if document is None else document.colors,
-    )
+        "objects": document.objects == tuple(s.name for s in scene.shapes),
+        "colors": document.colors,
+    }
 
 
 def _blank_comments(lines: TextLines) -> None:

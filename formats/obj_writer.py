@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fba.arrays import Floats, Ints
+from fba.mesh import PolyMesh
 from fba.scene import FaceScene
 from formats.files import write_bytes
 from formats.gathered import GatheredMesh, gather_mesh, original_order
@@ -35,29 +36,51 @@ def write_obj(
     OutputFileError
         If the file cannot be written.
     """
-    gathered = gather_mesh(scene)
-    if polygons is not None:
-        order = original_order(gathered.mesh, *polygons)
-        if order is not None:
-            gathered = gathered.reordered(order)
-    mesh = gathered.mesh
-    library = path.with_suffix(".mtl")
-    lines: list[str] = []
-    if gathered.materials:
-        lines.append(f"mtllib {library.name}")
-    vertices = (
-        mesh.vertices if colors is None or len(colors) != mesh.vertex_count else np.hstack([mesh.vertices, colors])
-    )
-    objects = objects and (len(gathered.shape_names) > 1 or gathered.shape_names[0] != "face")
-    lines += _vertices(vertices, scene, objects)
-    if mesh.texcoords is not None:
-        lines += _rows("vt", mesh.texcoords)
-    if mesh.normals is not None:
-        lines += _rows("vn", mesh.normals)
-    lines += _faces(gathered, objects)
-    if gathered.materials:
-        write_bytes(library, format_mtl(gathered.materials).encode())
-    write_bytes(path, ("\n".join(lines) + "\n").encode())
+    text = ObjText(scene, path.with_suffix(".mtl").name, polygons=polygons, objects=objects, colors=colors)
+    if text.gathered.materials:
+        write_bytes(path.with_suffix(".mtl"), format_mtl(text.gathered.materials).encode())
+    write_bytes(path, text.of(text.gathered.mesh.vertices, normals=True))
+
+
+class ObjText:
+    """The text of a scene, for one or many sets of vertex positions; parameters as in `write_obj`.
+
+    library : file name of the material library, named in the text when there are materials.
+    """
+
+    def __init__(
+        self,
+        scene: FaceScene,
+        library: str,
+        *,
+        polygons: tuple[Ints, Ints] | None = None,
+        objects: bool = True,
+        colors: Floats | None = None,
+    ) -> None:
+        gathered = gather_mesh(scene)
+        if polygons is not None:
+            order = original_order(gathered.mesh, *polygons)
+            if order is not None:
+                gathered = gathered.reordered(order)
+        self.gathered = gathered
+        self._scene = scene
+        self._objects = objects and (len(gathered.shape_names) > 1 or gathered.shape_names[0] != "face")
+        self._colors = colors if colors is not None and len(colors) == gathered.mesh.vertex_count else None
+        self._head = [f"mtllib {library}"] if gathered.materials else []
+        self._tails: dict[bool, list[str]] = {}
+
+    def of(self, vertices: Floats, *, normals: bool) -> bytes:
+        """The file's bytes with these (N, 3) positions; without normals where they no longer fit."""
+        if normals not in self._tails:
+            mesh = self.gathered.mesh
+            rows = [] if mesh.texcoords is None else _rows("vt", mesh.texcoords)
+            if normals and mesh.normals is not None:
+                rows += _rows("vn", mesh.normals)
+            self._tails[normals] = rows + _faces(self.gathered, self._objects, normals)
+        if self._colors is not None:
+            vertices = np.hstack([vertices, self._colors])
+        lines = [*self._head, *_vertices(vertices, self._scene, self._objects), *self._tails[normals]]
+        return ("\n".join(lines) + "\n").encode()
 
 
 def _vertices(vertices: Floats, scene: FaceScene, objects: bool) -> list[str]:
@@ -82,9 +105,9 @@ def _rows(keyword: str, values: Floats) -> list[str]:
     return list(map(line, *values.T.tolist()))
 
 
-def _faces(gathered: GatheredMesh, objects: bool) -> list[str]:
+def _faces(gathered: GatheredMesh, objects: bool, normals: bool) -> list[str]:
     mesh = gathered.mesh
-    corners = _corners(gathered)
+    corners = _corners(mesh, normals)
     offsets = mesh.offsets.tolist()
     state: list[tuple[str, list[int], tuple[str, ...]]] = []
     if objects:
@@ -106,14 +129,14 @@ def _faces(gathered: GatheredMesh, objects: bool) -> list[str]:
     return lines
 
 
-def _corners(gathered: GatheredMesh) -> list[str]:
-    mesh = gathered.mesh
+def _corners(mesh: PolyMesh, normals: bool) -> list[str]:
     vertex = (mesh.indices + 1).tolist()
+    normal_indices = mesh.normal_indices if normals else None
+    if mesh.texcoord_indices is None and normal_indices is None:
+        return list(map(str, vertex))
     absent = np.full(mesh.indices.size, -1)
     texcoord = (absent if mesh.texcoord_indices is None else mesh.texcoord_indices).tolist()
-    normal = (absent if mesh.normal_indices is None else mesh.normal_indices).tolist()
-    if mesh.texcoord_indices is None and mesh.normal_indices is None:
-        return list(map(str, vertex))
+    normal = (absent if normal_indices is None else normal_indices).tolist()
     out = []
     for v, t, n in zip(vertex, texcoord, normal, strict=True):
         uv = str(t + 1) if t >= 0 else ""
