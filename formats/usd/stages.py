@@ -46,6 +46,10 @@ def open_stage(path: Path) -> Usd.Stage:
     """
     if not read_bytes(path).startswith(_MAGIC):
         raise InputFileError(f"{path} is not a USD file: it starts neither like .usda text nor like .usdc data")
+    known = Sdf.Layer.Find(str(path.absolute()))
+    if known and not known.dirty:
+        # Somebody in this process still holds the file as it was; look whether it has changed since.
+        known.Reload()
     stage = Usd.Stage.Open(str(path.absolute()))
     problems = stage.GetCompositionErrors()
     if problems:

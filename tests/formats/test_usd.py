@@ -15,7 +15,8 @@ from fat import AnimatableFace, FaceDefMesh, FaceDefTable, FaceDefTables, FaceDe
 from fat.evaluate import Player
 from fba import FaceScene, Frame, Material, PolyMesh, Shape, Transform
 from fba.errors import FaceDefTablesError, FbaError, InputFileError, OutputFileError
-from formats import read, usd, write
+from formats import read, read_face, usd, write
+from formats.usd.validate import validate_stage
 
 Z_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 TURNED = np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]])
@@ -241,6 +242,25 @@ def test_what_another_program_changes_wins_over_the_exact_twins(tmp_path: Path) 
     half = Player(found).pose({3: 400}).local["skin"] - points
     before = Player(face).pose({3: 400}).local["skin"] - face.scene.shape("skin").mesh.vertices
     assert np.allclose(half, before, atol=1e-5)
+
+
+def test_a_file_that_somebody_holds_open_is_read_as_it_is_now(tmp_path: Path) -> None:
+    path = tmp_path / "face.usdc"
+    usd.write(small_face(), path)
+    held = Usd.Stage.Open(str(path))
+    changed = replace(small_face(), notes={"changed": "yes"})
+    usd.write(changed, path)
+    assert_same_face(_face(path), changed)
+    assert held
+
+
+@pytest.mark.parametrize("extension", ["usda", "USDC"])
+def test_the_shipped_source_reads_back_exactly(tmp_path: Path, extension: str) -> None:
+    source = read_face("default")
+    path = tmp_path / f"source.{extension}"
+    write(source, path)
+    assert_same_face(read_face(path), source)
+    assert validate_stage(path) == []
 
 
 @pytest.mark.parametrize("extension", ["usda", "usdc"])
