@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -86,6 +87,16 @@ def _outer_graph(surface: Surface, contour: Contour) -> tuple[object, Ints]:
 
 def _path(graph: object, places: Ints, surface: Surface, a: str, b: str) -> Floats | None:
     """(k, 3) positions along the cheapest way between two feature points; None where there is none."""
+    way = _way(graph, places, surface, a, b)
+    if way is None:
+        return None
+    line: Floats = surface.vertices[way].copy()
+    line[0], line[-1] = surface.positions[a], surface.positions[b]
+    return line
+
+
+def _way(graph: object, places: Ints, surface: Surface, a: str, b: str) -> Ints | None:
+    """Vertices along the cheapest way between two feature points; None where there is none."""
     from scipy.sparse.csgraph import dijkstra
 
     new = {int(v): k for k, v in enumerate(places)}
@@ -99,9 +110,8 @@ def _path(graph: object, places: Ints, surface: Surface, a: str, b: str) -> Floa
         if before[way[-1]] < 0:
             return None
         way.append(int(before[way[-1]]))
-    line: Floats = surface.vertices[places[np.array(way[::-1])]].copy()
-    line[0], line[-1] = surface.positions[a], surface.positions[b]
-    return line
+    found: Ints = places[np.array(way[::-1])]
+    return found
 
 
 def _divide(line: Floats | None, positions: Mapping[str, Floats], a: str, b: str, count: int) -> list[Floats]:
@@ -113,6 +123,32 @@ def _divide(line: Floats | None, positions: Mapping[str, Floats], a: str, b: str
         return []
     at = along[-1] * np.arange(1, count + 1) / (count + 1)
     return [np.array([np.interp(t, along, line[:, axis]) for axis in range(3)]) for t in at]
+
+
+def contour_places(surface: Surface, contour: Contour) -> Any:
+    """(k, n) sparse matrix that evaluates a vertex field at the anchors of one edge, in order.
+
+    Anchors lie between two vertices of the way along the edge. Feature points are not among them.
+    """
+    from scipy.sparse import csr_array
+
+    graph, places = _outer_graph(surface, contour)
+    rows, columns, weights = [], [], []
+    row = 0
+    for a, b in pairwise(contour.points):
+        way = _way(graph, places, surface, a, b)
+        if way is None or len(way) < 2:
+            continue
+        steps = np.linalg.norm(np.diff(surface.vertices[way], axis=0), axis=1)
+        along = np.concatenate([[0.0], np.cumsum(steps)])
+        for t in along[-1] * np.arange(1, contour.anchors + 1) / (contour.anchors + 1):
+            k = int(np.clip(np.searchsorted(along, t, side="right") - 1, 0, len(steps) - 1))
+            share = (t - along[k]) / max(float(steps[k]), 1e-12)
+            rows += [row, row]
+            columns += [int(way[k]), int(way[k + 1])]
+            weights += [1.0 - share, share]
+            row += 1
+    return csr_array((weights, (rows, columns)), shape=(row, surface.vertex_count))
 
 
 def lid_profile(anchors: Mapping[str, tuple[int, Floats]]) -> dict[str, float]:

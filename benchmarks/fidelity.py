@@ -1,0 +1,244 @@
+"""How faithful Facial Motion Cloning is: measures on faces whose motion is known, and on one whose is not.
+
+    python benchmarks/fidelity.py [--makehuman FOLDER] [--faces FOLDER] [--sheets FOLDER] [--json FILE]
+
+MakeHuman's source head is cloned onto two other phenotypes, decimated to another topology, where its own units are
+the truth, and onto ICT-FaceKit, where no truth exists. The default mode stands beside the published one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cloning import CloneReport, clone_shapes
+from cloning.labels import visible
+from cloning.prepare import PreparedFace, prepare
+from fba.arrays import Floats
+from fba.feature_points import FeaturePoint, FeaturePoints
+from fba.scene import FaceScene
+from fba.shapes import ShapeSet
+from formats import read_scene
+from samples.build.makehuman import open_makehuman
+from samples.build.phenotypes import KnownHead, decimated, known, phenotype_a, phenotype_b
+from samples.build.source import source_head
+from studio.render.figure import Figure
+
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+LIPS = (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))
+LIDS = {"eyeBlinkLeft": ("3.1", "3.3"), "eyeBlinkRight": ("3.2", "3.4")}
+MOVING = 0.01
+FACE_UNITS = ("eyeBlinkLeft", "mouthSmileLeft", "jawOpen", "browInnerUp", "mouthFunnel", "cheekPuff")
+
+
+@dataclass(frozen=True)
+class Target:
+    """A face to clone onto, and the truth where it is known."""
+
+    name: str
+    scene: FaceScene
+    points: FeaturePoints
+    truth: ShapeSet | None
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--makehuman", type=Path, default=SHARED / "faces" / "makehuman")
+    parser.add_argument("--faces", type=Path, default=SHARED)
+    parser.add_argument("--sheets", type=Path)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    makehuman = open_makehuman(options.makehuman)
+    source = known(source_head(makehuman))
+    shapes = source.shapes()
+    prepared = prepare(source.scene, source.points, "source")
+    rows = []
+    print(f"{'target':14}{'mode':12}" + "".join(f"{name:>11}" for name in HEADINGS))
+    print_row("source", "itself", own_measures(prepared, shapes))
+    for target in targets(makehuman, options.faces):
+        for as_published in (False, True):
+            cloned, report = clone_shapes(
+                source.scene, source.points, shapes, target.scene, target.points, as_published=as_published
+            )
+            row = measure(prepared, shapes, target, cloned, report)
+            mode = "published" if as_published else "default"
+            print_row(target.name, mode, row)
+            rows.append({"target": target.name, "mode": mode, **row})
+            if options.sheets is not None:
+                draw(target, cloned, options.sheets / f"fidelity_{target.name}_{mode}.png")
+    if options.json is not None:
+        options.json.write_text(json.dumps(rows, indent=2))
+
+
+def targets(makehuman: object, faces: Path) -> Iterator[Target]:
+    """Two phenotypes in another topology, their source topology, and ICT-FaceKit where the folder is there."""
+    for name, build in (("phenotype_a", phenotype_a), ("phenotype_b", phenotype_b)):
+        head = build(makehuman)  # type: ignore[arg-type]
+        for kind, made in (("", known(head)), ("_dec", decimated(head))):
+            yield Target(name + kind, made.scene, made.points, _truth(made))
+    mesh = faces / "faces" / "ict-facekit" / "generic_neutral_mesh.obj"
+    if mesh.exists():
+        scene = read_scene(mesh)
+        yield Target("ict", scene, read_kit_points(faces / "landmarks" / "ict.json", scene), None)
+
+
+def _truth(head: KnownHead) -> ShapeSet:
+    return head.shapes()
+
+
+def read_kit_points(path: Path, scene: FaceScene) -> FeaturePoints:
+    """Feature points given as three vertices of the file and their weights."""
+    order = scene.file_order()
+    size = scene.vertex_count
+    shape_of = np.empty(size, dtype=object)
+    place_of = np.zeros(size, dtype=int)
+    for name, ids in order.items():
+        shape_of[ids] = name
+        place_of[ids] = np.arange(len(ids))
+    points = {}
+    for key, row in json.loads(path.read_text()).items():
+        if "face" in row:
+            names = [shape_of[v] for v in row["face"]]
+            points[key] = FeaturePoint(
+                names[int(np.argmax(row["bary"]))], tuple(int(place_of[v]) for v in row["face"]), tuple(row["bary"])
+            )
+        else:
+            points[key] = FeaturePoint.free(np.array(row["point"]))
+    return FeaturePoints(points)
+
+
+HEADINGS = ("fp_before", "fp_after", "truth", "truth_hid", "lid", "lid_worst", "lip", "flips%", "stretch", "still")
+
+
+def print_row(target: str, mode: str, row: dict[str, float]) -> None:
+    cells = "".join(f"{row[h]:11.4f}" if h in row else f"{'-':>11}" for h in HEADINGS)
+    print(f"{target:14}{mode:12}{cells}")
+
+
+def own_measures(face: PreparedFace, shapes: ShapeSet) -> dict[str, float]:
+    """What the source itself has: lids after a blink, flips, stretch."""
+    moved = [skin_offsets(face, shapes, k) for k in range(len(shapes.names))]
+    lids = [lid_gaps(face, moved[shapes.names.index(name)], name) for name in LIDS]
+    flips, stretch = zip(*(distortion(face, m) for m in moved), strict=True)
+    return {
+        "lid": float(np.mean([gap[0] for gap in lids])),
+        "lid_worst": max(gap[1] for gap in lids),
+        "flips%": 100.0 * float(np.mean(flips)),
+        "stretch": float(np.mean(stretch)),
+    }
+
+
+def measure(
+    source: PreparedFace, shapes: ShapeSet, target: Target, cloned: ShapeSet, report: CloneReport
+) -> dict[str, float]:
+    """All measures of one clone; lids and lips are beside the source's own value."""
+    face = prepare(target.scene, target.points, "target")
+    mine = [skin_offsets(source, shapes, k) for k in range(len(shapes.names))]
+    yours = [skin_offsets(face, cloned, k) for k in range(len(shapes.names))]
+    row = {
+        "fp_before": report.measures["fp_error_before"],
+        "fp_after": report.measures["fp_error_after"],
+    }
+    lids, worst = [], []
+    for name in LIDS:
+        k = shapes.names.index(name)
+        a, b = lid_gaps(source, mine[k], name), lid_gaps(face, yours[k], name)
+        lids.append(abs(b[0] - a[0]))
+        worst.append(b[1] - a[1])
+    row["lid"], row["lid_worst"] = max(lids), max(worst)
+    row["lip"] = max(
+        float(np.abs(lip_gaps(face, b) - lip_gaps(source, a)).max()) for a, b in zip(mine, yours, strict=True)
+    )
+    flips, stretch = zip(*(distortion(face, m) for m in yours), strict=True)
+    row["flips%"], row["stretch"] = 100.0 * float(np.mean(flips)), float(np.mean(stretch))
+    row["still"] = max(back_of_head(face, m) for m in yours)
+    if target.truth is not None:
+        seen = visible(face.skin)
+        real = [skin_offsets(face, target.truth, k) for k in range(len(shapes.names))]
+        row["truth"] = float(np.mean([relative(b[seen], a[seen]) for a, b in zip(real, yours, strict=True)]))
+        row["truth_hid"] = float(np.mean([relative(b[~seen], a[~seen]) for a, b in zip(real, yours, strict=True)]))
+    return row
+
+
+def relative(found: Floats, truth: Floats) -> float:
+    size = float(np.linalg.norm(truth))
+    return float(np.linalg.norm(found - truth)) / size if size else 0.0
+
+
+def skin_offsets(face: PreparedFace, shapes: ShapeSet, k: int) -> Floats:
+    """Skin offsets of one shape, in eye separations."""
+    frame = face.scene.frame
+    return face.skin.join(face.scene.scatter(frame.from_file(shapes.deltas[k]))) / face.fapu.es0
+
+
+def _at(face: PreparedFace, offsets: Floats, ids: list[str]) -> Floats:
+    rows = face.skin.point_matrix(ids)
+    found: Floats = rows @ (face.skin.vertices + offsets)
+    return found
+
+
+def lid_gaps(face: PreparedFace, offsets: Floats, name: str) -> tuple[float, float]:
+    """Gap in the middle of the lids, and the largest along their edges, in IRISD."""
+    from cloning.contours import CONTOURS, contour_places
+
+    upper, lower = LIDS[name]
+    iris = face.fapu.irisd0 / face.fapu.es0
+    top, bottom = _at(face, offsets, [upper, lower])
+    lines = {c.label: c for c in CONTOURS}
+    pair = (3, 4) if upper == "3.1" else (5, 6)
+    edges = [contour_places(face.skin, lines[k]) @ (face.skin.vertices + offsets) for k in pair]
+    gaps = edges[0][:, 1] - edges[1][:, 1]
+    return float(top[1] - bottom[1]) / iris, float(gaps.max()) / iris
+
+
+def lip_gaps(face: PreparedFace, offsets: Floats) -> Floats:
+    """How much the lips part or close at three places against the neutral face, in MNS."""
+    ids = [i for pair in LIPS for i in pair]
+    change = _at(face, offsets, ids) - _at(face, 0.0 * offsets, ids)
+    gaps: Floats = (change[::2, 1] - change[1::2, 1]) * face.fapu.es0 / face.fapu.mns0
+    return gaps
+
+
+def distortion(face: PreparedFace, offsets: Floats) -> tuple[float, float]:
+    """Share of moving triangles turned by more than 90 degrees, and the 99th percentile of |log edge ratio|."""
+    triangles = face.skin.triangles
+    size = np.linalg.norm(offsets, axis=1)
+    moving = size[triangles].max(axis=1) > MOVING * max(float(size.max()), 1e-12)
+    rest, moved = face.skin.vertices[triangles[moving]], (face.skin.vertices + offsets)[triangles[moving]]
+    normals = [np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0]) for v in (rest, moved)]
+    flipped = np.einsum("ij,ij->i", *normals) < 0
+    sides = [np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2) for v in (rest, moved)]
+    ratio = np.abs(np.log(np.maximum(sides[1], 1e-9) / np.maximum(sides[0], 1e-9)))
+    return float(flipped.mean()) if len(flipped) else 0.0, float(np.percentile(ratio, 99)) if ratio.size else 0.0
+
+
+def back_of_head(face: PreparedFace, offsets: Floats) -> float:
+    """Largest offset behind the ears, relative to the largest anywhere."""
+    ear = face.skin.positions.get("10.3", face.skin.positions["7.1"])
+    behind = face.skin.vertices[:, 2] < ear[2] - 0.1
+    size = np.linalg.norm(offsets, axis=1)
+    return float(size[behind].max(initial=0.0)) / max(float(size.max()), 1e-12)
+
+
+def draw(target: Target, cloned: ShapeSet, path: Path) -> None:
+    """A row of pictures, one for each of some units."""
+    from PIL import Image
+
+    face = prepare(target.scene, target.points, "target")
+    figure = Figure(face.scene, face.points)
+    pictures = []
+    for name in FACE_UNITS:
+        delta = face.scene.scatter(face.scene.frame.from_file(cloned.deltas[cloned.names.index(name)]))
+        posed = {s.name: face.scene.world_vertices(s.name) + delta[s.name] for s in face.scene.shapes}
+        pictures.append(figure.draw(posed, (320, 320)))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(np.hstack(pictures)).save(path)
+
+
+if __name__ == "__main__":
+    main()
