@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,6 +66,24 @@ class FapStream:
 
     def __len__(self) -> int:
         return len(self.values)
+
+    def held(self) -> FapStream:
+        """Return the stream with every FAP kept at its last value in frames that do not speak of it.
+
+        The public players differ: some take such a FAP for neutral (so does this toolkit), some keep the last value,
+        which is what this gives them. FAPs stay unmasked until their first value.
+        """
+        rows = np.arange(len(self))[:, None]
+        last = np.maximum.accumulate(np.where(self.mask, rows, -1), axis=0)
+        at = np.maximum(last, 0)
+        columns = np.arange(FAP_COUNT)
+        return replace(
+            self,
+            values=np.where(last >= 0, self.values[at, columns], 0),
+            mask=last >= 0,
+            visemes=np.where(last[:, :1] >= 0, self.visemes[at[:, 0]], 0),
+            expressions=np.where(last[:, 1:2] >= 0, self.expressions[at[:, 1]], 0),
+        )
 
     @classmethod
     def build(
