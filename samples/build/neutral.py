@@ -18,8 +18,6 @@ LIP_GAP = 2.0 / 1024.0
 LIP_REACH = 0.17
 """How far from the line of contact a lip follows the correction, in ES0."""
 PASSES = 6
-LID_SHARE = 0.88
-"""Half the lid opening over the larger of the two distances lid - pupil that the raw head has."""
 TONGUE_CLEARANCE = 0.02
 """The tip stays this far (ES0) behind the front of the teeth, whose strips have no thickness."""
 LASH_ROWS = 5
@@ -30,16 +28,21 @@ LASH_LENGTH = 0.6
 SIDES = (("left", "3.1", "3.3", "3.5"), ("right", "3.2", "3.4", "3.6"))
 
 
-def neutral(head: Head) -> Head:
-    """Return the head with lids tangent to the iris, lips closed on a level line, and teeth and tongue in place."""
-    head = _lids(replace(head, placed=_lid_points(head)))
+def neutral(head: Head, opening: float) -> Head:
+    """Return the head with lids tangent to the iris, lips closed on a level line, and teeth and tongue in place.
+
+    Parameters
+    ----------
+    opening : of the lids = diameter of the iris, in ES0.
+    """
+    head = _lids(replace(head, placed=lid_points(head)), opening)
     for _ in range(PASSES):
         head = head.moved({"skin": close_lips(head)})
-    head = replace(head, placed={**head.placed, **_lip_points(head)})
+    head = replace(head, placed={**head.placed, **lip_points(head)})
     return _lashes(_teeth(head))
 
 
-def _lid_points(head: Head) -> dict[str, FeaturePoint]:
+def lid_points(head: Head) -> dict[str, FeaturePoint]:
     """Feature points 3.1-3.4 on the rims that bound the opening, above and below the pupil."""
     placed = {}
     for side, upper, lower, eye in SIDES:
@@ -50,7 +53,7 @@ def _lid_points(head: Head) -> dict[str, FeaturePoint]:
     return placed
 
 
-def _lids(head: Head) -> Head:
+def _lids(head: Head, opening: float) -> Head:
     """Mix in eyeWide and eyeSquint so that each lid is half the opening away from the pupil's height.
 
     The iris radius follows the opening, so the lids become tangent to the iris above and below.
@@ -60,7 +63,7 @@ def _lids(head: Head) -> Head:
     for side, upper, lower, eye in SIDES:
         names = [name + side.capitalize() for name in ("eyeWide", "eyeSquint")]
         rows = [[_move(head, key, head.unit(name)["skin"])[1] for name in names] for key in (upper, lower)]
-        half = LID_SHARE * max(p[upper][1] - p[eye][1], p[eye][1] - p[lower][1])
+        half = 0.5 * opening * head.fapu.es0
         wanted = [p[eye][1] + half - p[upper][1], p[eye][1] - half - p[lower][1]]
         for name, weight in zip(names, np.linalg.solve(np.array(rows), np.array(wanted)), strict=True):
             body += weight * head.makehuman.target("faceunits", name)
@@ -104,7 +107,7 @@ def close_lips(head: Head, motion: Floats | None = None) -> Floats:
     return offsets
 
 
-def _lip_points(head: Head) -> dict[str, FeaturePoint]:
+def lip_points(head: Head) -> dict[str, FeaturePoint]:
     """Feature points 2.2, 2.3 and 2.6-2.9 where the standard has them: on the lines along which the lips meet."""
     quarter = 0.5 * head.positions["2.4"][0]
     span = np.array([-quarter, 0.0, quarter])

@@ -18,7 +18,7 @@ from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.mesh import PolyMesh
 from fba.scene import FaceScene, Shape
 from fba.shapes import ShapeSet
-from samples.build.contact import LIDS, LIPS, side_mask
+from samples.build.contact import LIDS, LIPS, side_mask, surface_edge
 from samples.build.head import Head, build_head, macro
 from samples.build.makehuman import MakeHuman
 from samples.build.neutral import neutral
@@ -81,14 +81,16 @@ def phenotype_a(makehuman: MakeHuman) -> Head:
     mixture = macro("african", "male", "young", 1.0)
     mixture |= {("head_targets", "head-square"): 1.0, ("nose_targets", "nose-scale-horiz-incr"): 0.7}
     head = build_head(makehuman, mixture, "phenotype_a")
-    return neutral(_scaled(head, "8.1", (1.08, 1.0, 1.0), 0.45))
+    return neutral(_scaled(head, "8.1", (1.08, 1.0, 1.0), 0.45), 0.14)
 
 
 def phenotype_b(makehuman: MakeHuman) -> Head:
     """Asian female with large eyes and a narrow mouth."""
     head = build_head(makehuman, macro("asian", "female", "young", 1.0), "phenotype_b")
     head = _scaled(head, "8.1", (0.88, 1.0, 1.0), 0.45)
-    return neutral(_scaled(_scaled(head, "3.5", (1.12, 1.35, 1.12), 0.3), "3.6", (1.12, 1.35, 1.12), 0.3))
+    for eye in ("3.5", "3.6"):
+        head = _scaled(head, eye, (1.12, 1.35, 1.12), 0.3)
+    return neutral(head, 0.17)
 
 
 def known(head: Head, names: Iterable[str] = BENCHMARK_UNITS) -> KnownHead:
@@ -132,28 +134,35 @@ def simplified(mesh: PolyMesh, vertices: int) -> PolyMesh:
 
 
 def transfer_points(head: Head, scene: FaceScene, places: Mapping[str, Places]) -> dict[str, FeaturePoint]:
-    """Feature points of a head on a scene whose vertices lie at `places` of the head's shapes."""
-    sides: dict[str, Bools] = {}
-    for edge in (*LIPS.values(), *LIDS.values()):
-        mask = side_mask(head, edge).astype(np.float64)
-        allowed = places["skin"].carry(mask[:, None])[:, 0] > 0.5
-        sides |= dict.fromkeys(edge.seeds, allowed)
-    found = {}
-    for key, point in head.points.items():
-        if point.shape is None:
-            found[key] = point
-            continue
-        source = head.scene.shape(point.shape).mesh
-        weights = np.asarray(point.weights)
-        normal = weights @ source.vertex_normals()[list(point.vertices)]
-        place = nearest_facing(
-            head.positions[key][None],
-            (normal / max(float(np.linalg.norm(normal)), 1e-300))[None],
-            scene.shape(point.shape).mesh,
-            sides.get(key) if point.shape == "skin" else None,
-        )
-        found[key] = place.feature_point(0, point.shape)
+    """Feature points of a head on a scene whose vertices lie at `places` of the head's shapes.
+
+    Points of lips and lids stay on their own side; those on a rim are placed on the rim of the new surface.
+    """
+    edges = (*LIPS.values(), *LIDS.values())
+    sides = [places["skin"].carry(side_mask(head, e).astype(np.float64)[:, None])[:, 0] > 0.5 for e in edges]
+    allowed = {key: side for edge, side in zip(edges, sides, strict=True) for key in edge.seeds}
+    found = {key: _transfer(head, scene, key, allowed.get(key)) for key in head.points}
+    skin = scene.shape("skin").mesh
+    for edge, side in zip(edges, sides, strict=True):
+        span = np.array([head.positions[key][0] for key in edge.guide[1:-1]])
+        guide = np.array([head.positions[key] for key in edge.guide])
+        triangles = skin.triangles[side[skin.triangles].all(axis=1)]
+        line = surface_edge(skin.vertices, triangles, guide, span, edge, head.fapu.es0)
+        for row, key in enumerate(edge.guide[1:-1]):
+            found[key] = line.feature_point(row)
     return found
+
+
+def _transfer(head: Head, scene: FaceScene, key: str, allowed: Bools | None) -> FeaturePoint:
+    point = head.points[key]
+    if point.shape is None:
+        return point
+    weights = np.asarray(point.weights)
+    normal = weights @ head.scene.shape(point.shape).mesh.vertex_normals()[list(point.vertices)]
+    normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
+    mesh = scene.shape(point.shape).mesh
+    side = allowed if point.shape == "skin" else None
+    return nearest_facing(head.positions[key][None], normal[None], mesh, side).feature_point(0, point.shape)
 
 
 def _scaled(head: Head, center: str, factors: tuple[float, float, float], reach: float) -> Head:

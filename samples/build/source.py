@@ -23,6 +23,8 @@ from samples.build.neutral import neutral
 
 RACES = {"caucasian": 0.35, "asian": 0.35, "african": 0.3}
 SEXES = {"female": 0.6, "male": 0.4}
+LID_OPENING = 0.155
+"""Of the eye separation: nearly MakeHuman's own; the iris is as wide."""
 THRUST = 100
 """Border of the eyeball thrust, FAP 27 and 28."""
 
@@ -34,7 +36,7 @@ def source_head(makehuman: MakeHuman) -> Head:
         for sex, part in SEXES.items():
             for key, weight in macro(race, sex, "young", share * part).items():
                 mixture[key] = mixture.get(key, 0.0) + weight
-    return neutral(build_head(makehuman, mixture, "source"))
+    return neutral(build_head(makehuman, mixture, "source"), LID_OPENING)
 
 
 def build_source(makehuman: MakeHuman) -> AnimatableFace:
