@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 
@@ -229,13 +230,17 @@ class FaceScene:
         MeshError
             If two shapes claim the same place.
         """
+        return dict(self._places)
+
+    @cached_property
+    def _places(self) -> dict[str, Ints]:
         places: dict[str, Ints] = {}
         start = 0
         for shape in self.shapes:
             if shape.vertex_ids is not None:
                 places[shape.name] = shape.vertex_ids
             else:
-                places[shape.name] = np.arange(start, start + shape.mesh.vertex_count, dtype=np.int32)
+                places[shape.name] = frozen(range(start, start + shape.mesh.vertex_count), np.int32, (-1,))
             start += shape.mesh.vertex_count
         joined = np.concatenate(list(places.values())) if places else np.zeros(0, np.int32)
         if joined.size and (np.unique(joined).size != joined.size or int(joined.max()) != joined.size - 1):
