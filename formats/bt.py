@@ -55,15 +55,10 @@ def to_text(face: FaceScene | AnimatableFace) -> str:
     routes = [s for s in built.statements if isinstance(s, Route)]
     rest: list[VrmlNode | Use] = [s for s in built.statements if isinstance(s, (VrmlNode, Use))]
     if built.face is not None:
-        inside = [s for s in rest if isinstance(s, VrmlNode) and s.def_name in built.roots]
-        first = next((k for k, s in enumerate(rest) if s in inside), len(rest))
-        outside = [(k, s) for k, s in enumerate(rest) if not any(s is i for i in inside)]
-        face_with_scene = _with_scene(built.face, tuple(inside))
-        rest = [
-            *(s for k, s in outside if k < first),
-            face_with_scene,
-            *(s for k, s in outside if k > first),
-        ]
+        inside = tuple(s for s in rest if isinstance(s, VrmlNode) and s.def_name in built.roots)
+        first = next((k for k, s in enumerate(rest) if any(s is i for i in inside)), len(rest))
+        before, after = ([s for s in part if not any(s is i for i in inside)] for part in (rest[:first], rest[first:]))
+        rest = [*before, _with_scene(built.face, inside), *after]
     top = node("Group", children=Nodes((*rest, built.metadata), True))
     statements: tuple[Statement, ...] = (*protos, *definitions_first((top,)), *routes)
     return _DESCRIPTOR + print_tree(statements, bt=True)

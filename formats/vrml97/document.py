@@ -28,12 +28,14 @@ class VrmlDocument:
         declarations of the MPEG-4 nodes and without this toolkit's WorldInfo; every DEF is unique.
     nodes : name of a shape or transform of the scene -> its node in `statements`.
     parts : the same names -> the shape or transform as it was read, file axes.
+    face_fields : fields of the file's Face node that go out with the next Face: fit and ttsSource.
     findings : what the reader noticed.
     """
 
     statements: tuple[Statement, ...] = ()
     nodes: Mapping[str, VrmlNode] = field(default_factory=dict)
     parts: Mapping[str, Shape | Transform] = field(default_factory=dict)
+    face_fields: tuple[Field, ...] = ()
     findings: tuple[Finding, ...] = ()
 
 

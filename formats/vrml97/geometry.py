@@ -337,7 +337,9 @@ def changed_shape(
 
 
 def rows_of(part: PolyMesh, whole: PolyMesh) -> Ints | None:
-    """For each vertex of `part` the place of an equal vertex in `whole`; None if one is missing."""
+    """For each vertex of `part` the place of an equal vertex in `whole`; None if one is missing or there is none."""
+    if part.vertex_count == 0 or part.vertex_count > whole.vertex_count:
+        return None
     place = {row.tobytes(): k for k, row in reversed(list(enumerate(whole.vertices + 0.0)))}
     found = [place.get(row.tobytes()) for row in part.vertices + 0.0]
     if any(k is None for k in found):

@@ -54,17 +54,22 @@ class _Merger:
         self.document = document
         self.defs = definitions(document.statements)
         self.names = {id(item): name for name, item in document.nodes.items()}
-        outgoing = [n.name for n, _ in scene.walk()]
-        self.alive = {id(document.nodes[n]) for n in outgoing if n in document.nodes}
+        outgoing = [n for n, _ in scene.walk()]
+        self.alive = {id(known) for known in map(self.known, outgoing) if known is not None}
         self.def_names: dict[str, str] = {}
         taken = {*self.defs, METADATA_DEF}
-        for name in outgoing:
-            known = document.nodes.get(name)
+        for part in outgoing:
+            known = self.known(part)
             if known is not None and known.def_name is not None:
-                self.def_names[name] = known.def_name
+                self.def_names[part.name] = known.def_name
             else:
-                self.def_names[name] = unique(escape(name), taken)
-                taken.add(self.def_names[name])
+                self.def_names[part.name] = unique(escape(part.name), taken)
+                taken.add(self.def_names[part.name])
+
+    def known(self, part: Node) -> VrmlNode | None:
+        """The document's node of this name and kind."""
+        same_kind = type(self.document.parts.get(part.name)) is type(part)
+        return self.document.nodes[part.name] if same_kind else None
 
     # --- lists ----------------------------------------------------------------------------------------------
 
@@ -97,7 +102,7 @@ class _Merger:
 
     def cover(self, part: Node) -> set[int]:
         """The document's nodes that a node stands for: itself, or for a new transform what lies below it."""
-        known = self.document.nodes.get(part.name)
+        known = self.known(part)
         if known is not None:
             return {id(known)}
         if isinstance(part, Shape):
@@ -108,7 +113,7 @@ class _Merger:
 
     def emit(self, part: Node) -> VrmlNode:
         name = self.def_names[part.name]
-        known = self.document.nodes.get(part.name)
+        known = self.known(part)
         if isinstance(part, Shape):
             built = self.new_shape(part) if known is None else self.known_shape(part, known)
         else:

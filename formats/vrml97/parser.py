@@ -36,7 +36,7 @@ from formats.vrml97.tree import (
 MAX_DEPTH = 128
 """Nodes nested deeper than this are refused; exporters stay below 40."""
 
-MAX_ITEMS = 2_000_000
+MAX_ITEMS = 1_000_000
 """Nodes, fields, strings and Booleans in one file (numbers are not counted): bounds the memory of the tree."""
 
 _BLANK = r"(?:[ \t\n\r\f\v,]++|#[^\n]*+)*+"
@@ -52,7 +52,7 @@ _name = re.compile(r"[^\x00-\x20\"#,\[\]{}\x7f]++")
 _string = re.compile(r'"([^"\\]*+(?:\\.[^"\\]*+)*+)"', re.DOTALL)
 _escape = re.compile(r"\\(.)", re.DOTALL)
 _word = re.compile(r"[^\x00-\x20,#\"{}\[\]]++")
-_brace_part = re.compile(r'[^{}"#]++|"(?:[^"\\]|\\.)*+"|#[^\n]*+', re.DOTALL)
+_between_braces = re.compile(r'(?:[^{}\[\]"#]++|"[^"\\]*+(?:\\.[^"\\]*+)*+"|#[^\n]*+)++', re.DOTALL)
 _CHUNK = 1 << 21
 
 _ACCESS = frozenset({"field", "exposedField", "eventIn", "eventOut"})
@@ -198,22 +198,18 @@ class _Parser:
         return self.node()
 
     def raw(self) -> Raw:
-        """BT: everything up to the brace (or bracket) that closes the next one that opens."""
+        """BT: everything up to the brace or bracket that closes the next one that opens."""
         start = self.pos
-        close = {"{": "}", "[": "]"}
-        opener = next((c for c in re.findall(r"[\[{]", self.text[start : start + 200])), "{")
         depth = 0
         while self.pos < len(self.text):
-            part = _brace_part.match(self.text, self.pos)
-            if part and opener == "{":
+            if part := _between_braces.match(self.text, self.pos):
                 self.pos = part.end()
                 continue
-            character = self.text[self.pos]
+            depth += 1 if self.text[self.pos] in "{[" else -1
             self.pos += 1
-            depth += (character == opener) - (character == close[opener])
-            if depth == 0 and character == close[opener]:
-                return Raw(self.text[start : self.pos].strip())
-        raise self.fail(f"this '{opener}' block is not closed", start)
+            if depth <= 0:
+                return Raw(self.text[start : self.pos])
+        raise self.fail("this block is not closed", start)
 
     def route(self) -> Route:
         self.pos += len("ROUTE")

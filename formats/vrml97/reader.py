@@ -15,6 +15,7 @@ from fba.errors import InputFileError, LandmarkError, MeshError
 from fba.fapu import FAPU_DIVISOR, Fapu
 from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.findings import Finding
+from fba.orientation import orient
 from fba.scene import FaceScene, Role, Shape, Transform
 from formats.vrml97.axes import from_file_axes
 from formats.vrml97.document import VrmlDocument, split
@@ -22,7 +23,7 @@ from formats.vrml97.face_nodes import TableReader, calibration_points, fdp_of, r
 from formats.vrml97.metadata import Metadata, apply_to_shape, read_metadata
 from formats.vrml97.references import definitions_first, unique_definitions
 from formats.vrml97.scene import SceneReader
-from formats.vrml97.tree import Statement, Use, VrmlNode, definitions
+from formats.vrml97.tree import Field, Statement, Use, VrmlNode, definitions
 
 _ON_SURFACE = 0.02
 """A feature point within this part of the scene's diagonal is taken to lie on the surface: the printed coordinates
@@ -52,12 +53,15 @@ def assemble(statements: tuple[Statement, ...], name: str, findings: list[Findin
     reader = SceneReader(defs, wanted, findings)
     roots = reader.roots(kept)
     if not any(isinstance(p, Shape) for p in reader.parts.values()):
-        raise InputFileError(f"{name}: there is no IndexedFaceSet in a Shape: this file holds no polygon mesh")
+        raise InputFileError(
+            f"{name}: there is no IndexedFaceSet in a Shape, so this file holds no polygon mesh "
+            "(Inline files and the insides of PROTOs are not searched)"
+        )
     metadata = read_metadata(parts.metadata, findings)
     reader_nodes, scene = _scene(reader, roots, metadata, name)
-    document = VrmlDocument(kept, reader_nodes, _by_name(scene), tuple(findings))
+    document = VrmlDocument(kept, reader_nodes, _by_name(scene), _face_extras(parts.faces), tuple(findings))
     scene = replace(scene, document=document)
-    scene = replace(scene, roots=from_file_axes(scene.roots, metadata.frame), frame=metadata.frame)
+    scene = from_file_axes(scene, metadata.frame)
     if fdp is None:
         return scene
     face = _face(scene, fdp, everything, reader_nodes, defs, metadata, findings)
@@ -109,22 +113,35 @@ def _face(
     metadata: Metadata,
     findings: list[Finding],
 ) -> AnimatableFace:
+    positions = calibration_points(fdp, everything)
+    points = _checked_points(scene, metadata.points, positions, findings)
+    if points is None:
+        points = _snapped(scene, {i: scene.frame.from_file(p) for i, p in positions.items()})
+    if not metadata.shapes:
+        try:
+            scene, points, said = orient(scene, points)
+            findings.extend(said)
+        except LandmarkError as error:
+            findings.append(Finding("info", "axes", f"the file's axes are taken as they are: {error}"))
     scene_names = {n.def_name: name for name, n in nodes.items() if n.def_name is not None}
     tables = TableReader(scene, everything, scene_names, _geometry_names(nodes)).read(fdp)
     if not metadata.shapes:
         scene = _with_roles(scene, tables)
-    positions = {i: scene.frame.from_file(p) for i, p in calibration_points(fdp, everything).items()}
-    points = _checked_points(scene, metadata.points, positions, findings)
-    if points is None:
-        points = _snapped(scene, positions)
     notes = dict(metadata.notes)
     fapu = metadata.fapu
     if fapu is None:
-        fapu, missing = _measured(positions)
+        fapu, missing = _measured({i: scene.frame.from_file(p) for i, p in positions.items()})
         if missing:
             notes["fapu"] = message = f"not measurable: {missing}; one unit of length is taken for each"
             findings.append(Finding("warning", "fapu", message))
     return AnimatableFace(scene, points, tables, fapu, notes)
+
+
+def _face_extras(faces: tuple[VrmlNode, ...]) -> tuple[Field, ...]:
+    """Fields of the first Face that the toolkit does not use and gives back: interpolation table and speech source."""
+    for face in faces:
+        return tuple(p for p in face.body if isinstance(p, Field) and p.name in ("fit", "ttsSource"))
+    return ()
 
 
 def _geometry_names(nodes: Mapping[str, VrmlNode]) -> dict[str, str]:
@@ -175,7 +192,8 @@ def _checked_points(
     if fits:
         near = _DRIFT * _diagonal(scene)
         here = points.positions(scene)
-        fits = all(float(np.linalg.norm(here[i] - positions[i])) <= near for i in here if i in positions)
+        given = {i: scene.frame.from_file(p) for i, p in positions.items()}
+        fits = all(float(np.linalg.norm(here[i] - given[i])) <= near for i in here if i in given)
     if fits:
         return points
     message = "the noted feature points do not fit the mesh any more; featurePointsCoord is used instead"

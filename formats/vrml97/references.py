@@ -78,7 +78,7 @@ def definitions_first(
     placed: set[str] = set()
 
     def visit(item: Any, depth: int) -> Any:
-        if depth > MAX_DEPTH:
+        if depth >= MAX_DEPTH:
             raise UnsupportedFeatureError(f"nodes used by USE are nested deeper than {MAX_DEPTH} levels")
         if isinstance(item, Use):
             if item.name in placed or item.name not in known:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from fba.arrays import Floats, frozen
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class Numbers:
     """Numbers of any numeric field type; `values` is flat (n,) float64."""
 
@@ -30,7 +30,7 @@ class Numbers:
         return isinstance(other, Numbers) and self.many == other.many and np.array_equal(self.values, other.values)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Strings:
     """SFString or MFString."""
 
@@ -38,7 +38,7 @@ class Strings:
     many: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Booleans:
     """SFBool (or a list of them, which EXTERNPROTO extensions use)."""
 
@@ -46,7 +46,7 @@ class Booleans:
     many: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Nodes:
     """SFNode or MFNode; None is NULL."""
 
@@ -54,19 +54,19 @@ class Nodes:
     many: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Empty:
     """``[ ]``: a list whose type the text does not tell."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Is:
     """``IS name``: the field of the enclosing PROTO that this field takes its value from."""
 
     name: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Raw:
     """BT text in braces that is kept as it is: object descriptors and commands."""
 
@@ -76,14 +76,14 @@ class Raw:
 Value = Numbers | Strings | Booleans | Nodes | Empty | Is | Raw
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Use:
     """``USE name``."""
 
     name: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Field:
     """``name value`` in the body of a node."""
 
@@ -91,7 +91,7 @@ class Field:
     value: Value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Interface:
     """An interface declaration of a PROTO, EXTERNPROTO or Script.
 
@@ -104,7 +104,7 @@ class Interface:
     value: Value | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Route:
     """``ROUTE source.event_out TO target.event_in``."""
 
@@ -114,7 +114,7 @@ class Route:
     event_in: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Proto:
     """``PROTO name [ interface ] { body }``."""
 
@@ -123,7 +123,7 @@ class Proto:
     body: tuple[Statement, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ExternProto:
     """``EXTERNPROTO name [ interface ] urls``."""
 
@@ -132,7 +132,7 @@ class ExternProto:
     urls: Strings
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class VrmlNode:
     """A node: its type name, its body in file order, its DEF name, and the line it starts in (0: not from a file)."""
 

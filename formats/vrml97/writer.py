@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fat.face import AnimatableFace
 from fba.scene import FaceScene
-from formats.vrml97.document import MPEG4_NODES
+from formats.vrml97.document import MPEG4_NODES, VrmlDocument
 from formats.vrml97.face_nodes import face_node, fap_field
 from formats.vrml97.merge import merge
 from formats.vrml97.metadata import metadata_node
@@ -68,6 +68,17 @@ _INTERFACES: dict[str, tuple[tuple[str, str, Numbers | Nodes | Booleans | Empty]
         ("MFNode", "faceDefMesh", Empty()),
         ("MFNode", "faceDefTransform", Empty()),
     ),
+    "FIT": (
+        ("MFInt32", "FAPs", Empty()),
+        ("MFInt32", "Graph", Empty()),
+        ("MFInt32", "numeratorExp", Empty()),
+        ("MFInt32", "denominatorExp", Empty()),
+        ("MFInt32", "numeratorImpulse", Empty()),
+        ("MFInt32", "numeratorTerms", Empty()),
+        ("MFInt32", "denominatorTerms", Empty()),
+        ("MFFloat", "numeratorCoefs", Empty()),
+        ("MFFloat", "denominatorCoefs", Empty()),
+    ),
     "FDP": (
         ("SFNode", "featurePointsCoord", _NULL),
         ("SFNode", "textureCoord", _NULL),
@@ -111,6 +122,8 @@ def pieces(face: FaceScene | AnimatableFace) -> Written:
     built = None
     if isinstance(face, AnimatableFace):
         built = face_node(face, def_names, Nodes(tuple(Use(r) for r in roots), True))
+        if isinstance(scene.document, VrmlDocument):
+            built = replace(built, body=(*built.body, *scene.document.face_fields))
     return Written(statements, roots, built, metadata_node(face, def_names))
 
 

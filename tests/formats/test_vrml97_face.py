@@ -15,9 +15,11 @@ from faces import small_face, small_scene
 from fat import AnimatableFace, FaceDefMesh, FaceDefTable, FaceDefTables, FaceDefTransform, TransformField
 from fba import FaceScene, Fapu, FeaturePoint, FeaturePoints, Frame, PolyMesh, Role, Shape, standard_feature_points
 from fba.errors import FaceDefTablesError, FbaError, LandmarkError
+from fba.orientation import turn_scene
 from formats import bt, read, write
 from formats.vrml97 import VrmlDocument, parse, to_text
 from formats.vrml97.tree import Numbers, Use, VrmlNode, definitions, walk
+from samples import default_source
 
 SUFFIXES = (".wrl", ".wrz", ".wrl.gz", ".bt", ".bt.gz")
 FRAMES = (None, Frame(np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])), Frame(np.diag([-1.0, 1, 1]), True))
@@ -238,6 +240,34 @@ def test_notes_that_do_not_fit_are_said_and_ignored(tmp_path: Path) -> None:
     assert any(f.code == "feature-points" for f in document.findings)
 
 
+def test_axes_of_a_standard_face_are_found(tmp_path: Path) -> None:
+    """A Z-up file of another program: inside axes follow from featurePointsCoord, outputs keep the file's."""
+    face = read_face(default_source())
+    frame = Frame(np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]]))
+    turned = replace(turn_scene(face.scene, frame.axes.T), frame=Frame(), document=None)
+    slopes = [
+        replace(
+            t,
+            meshes=tuple(replace(m, displacements=frame.to_file(m.displacements)) for m in t.meshes),
+            transforms=(),
+        )
+        for t in face.tables
+    ]
+    positions = face.feature_points.positions(face.scene)
+    points = FeaturePoints({i: FeaturePoint.free(frame.to_file(p)) for i, p in positions.items()})
+    path = tmp_path / "z_up.wrl"
+    path.write_text(without_metadata(to_text(AnimatableFace(turned, points, FaceDefTables(tuple(slopes)), face.fapu))))
+    found = read_face(path)
+    assert np.array_equal(found.scene.frame.axes, frame.axes)
+    assert np.array_equal(found.scene.world_neutral(), face.scene.world_neutral())
+    for a, b in zip(found.tables, face.tables, strict=True):
+        for m, n in zip(a.meshes, b.meshes, strict=True):
+            assert np.array_equal(m.displacements, n.displacements)
+    assert np.isclose(found.fapu.es0, face.fapu.es0)
+    write(found, tmp_path / "again.wrl")
+    assert_same_face(read_face(tmp_path / "again.wrl"), found)
+
+
 # --- the standard's own syntax ------------------------------------------------------------------------------
 
 BT = """
@@ -297,6 +327,7 @@ def test_bt_example(tmp_path: Path) -> None:
     write(face, tmp_path / "b.bt")
     for name in ("b.wrl", "b.bt"):
         assert_same_face(read_face(tmp_path / name), face)
+        assert "FIT {" in (tmp_path / name).read_text()
 
 
 def test_definitions_may_stand_in_the_tables(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from fat.rig import rig_eye, rig_head
 from fba import FaceScene, Frame, PolyMesh, Role, Shape, Transform
 from fba.errors import MeshError
 from formats.vrml97 import VrmlDocument, parse, read, to_text, write
+from formats.vrml97.axes import from_file_axes, in_file_axes
 from formats.vrml97.tree import ExternProto, Proto, Route, Use, VrmlNode, definitions, walk
 
 HEADER = "#VRML V2.0 utf8\n"
@@ -180,6 +181,26 @@ def test_head_and_eye_transforms_are_inserted_around_the_nodes(tmp_path: Path) -
     assert [n.def_name for n in defs["Eye"].nodes("children") if isinstance(n, VrmlNode)] == ["eye_left_yaw"]
 
 
+def test_a_transform_that_takes_the_name_of_a_shape(tmp_path: Path) -> None:
+    scene = read_scene(tmp_path, HEADER + "DEF A Shape { " + face_set() + " }")
+    changed = replace(scene, roots=(Transform("A", (replace(scene.shapes[0], name="B"),), (1.0, 0.0, 0.0)),))
+    write(changed, tmp_path / "out.wrl")
+    back = read(tmp_path / "out.wrl")
+    assert isinstance(back, FaceScene)
+    assert [n.name for n, _ in back.walk()] == ["A", "B"]
+
+
+def test_deep_but_legal_nesting(tmp_path: Path) -> None:
+    depth = 118
+    text = HEADER + "Group { children [ " * depth + "Shape { " + face_set() + " }" + " ] }" * depth
+    scene = read_scene(tmp_path, text)
+    rigged, _ = rig_head(scene, np.zeros(3))
+    write(rigged, tmp_path / "out.wrl")
+    back = read(tmp_path / "out.wrl")
+    assert isinstance(back, FaceScene)
+    assert len(back.parents(back.shapes[0].name)) == depth + 3
+
+
 def test_a_root_that_moves_forward_keeps_its_references(tmp_path: Path) -> None:
     shape = "Shape { appearance USE Look " + face_set() + " }"
     text = (
@@ -248,9 +269,7 @@ def test_turned_axes_go_back_into_the_file_exactly(tmp_path: Path) -> None:
     scene = read_scene(tmp_path, FULL)
     axes = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
     frame = Frame(axes, True)
-    from formats.vrml97.axes import from_file_axes, in_file_axes
-
-    turned = replace(scene, roots=from_file_axes(scene.roots, frame), frame=frame)
+    turned = from_file_axes(scene, frame)
     world = scene.world_neutral() @ axes.T
     assert np.allclose(turned.world_neutral(), world, atol=1e-15)
     back = in_file_axes(turned)
@@ -265,27 +284,6 @@ def test_turned_axes_go_back_into_the_file_exactly(tmp_path: Path) -> None:
     assert again.frame.reversed_winding
     assert np.array_equal(again.world_neutral(), turned.world_neutral())
     assert np.array_equal(again.shapes[0].mesh.indices, turned.shapes[0].mesh.indices)
-
-
-@pytest.mark.parametrize("determinant", [1, -1])
-def test_turning_commutes_with_the_matrices(determinant: int) -> None:
-    from formats.vrml97.axes import turn_node
-
-    axes = np.array([[0.0, -1, 0], [0, 0, 1], [-1 * determinant, 0, 0]])
-    frame = Frame(axes)
-    mesh = PolyMesh.from_faces(np.random.default_rng(0).normal(size=(5, 3)), [[0, 1, 2, 3, 4]])
-    part = Transform(
-        "t",
-        (Shape("s", mesh),),
-        translation=(1.0, 2.0, 3.0),
-        rotation=(1.0, 2.0, 0.5, 0.7),
-        scale=(1.0, 2.0, 3.0),
-        scale_orientation=(0.0, 1.0, 1.0, 0.4),
-        center=(3.0, 0.0, 1.0),
-    )
-    plain = FaceScene((part,)).world_vertices("s")
-    turned = FaceScene((turn_node(part, frame.from_file, False),)).world_vertices("s")
-    assert np.allclose(turned, plain @ axes.T, atol=1e-12)
 
 
 def test_scene_without_document_is_a_clean_file(tmp_path: Path) -> None:
