@@ -57,5 +57,5 @@ def interval_weights(borders: Ints, values: ArrayLike) -> Floats:
     """
     rule = interval_rule(borders)
     value = np.asarray(values, dtype=np.float64)[..., None]
-    weights: Floats = rule.sign * (np.clip(value, rule.low, rule.high) - rule.origin)
+    weights: Floats = rule.sign * (np.clip(value, rule.low, rule.high) - rule.origin) + 0.0  # no negative zeros
     return weights

@@ -15,7 +15,7 @@ def fit_sphere(points: Floats) -> tuple[Floats, float, float]:
     Linear in the unknowns: ``|p|^2 = 2 p.c + (r^2 - |c|^2)``. Any part of the sphere will do; points that define none
     (fewer than four, or all in a plane) give the smallest solution, whose error or size shows it.
 
-    >>> fit_sphere(np.array([[3.0, 0, 0], [1, 0, 0], [2, 1, 0], [2, 0, 1]]))[1]
+    >>> round(fit_sphere(np.array([[3.0, 0, 0], [1, 0, 0], [2, 1, 0], [2, 0, 1]]))[1], 6)
     1.0
     """
     middle = points.mean(axis=0)
