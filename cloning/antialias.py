@@ -11,6 +11,9 @@ from fba.arrays import Floats, Ints
 SUPPORT = 0.02
 """Size of the filter in alignment space (Facial Motion Cloning, section "Antialiasing")."""
 
+DENSER = 1.5
+"""A source aliases where its edges are shorter than the target's by this factor."""
+
 
 @dataclass(frozen=True, eq=False)
 class Samples:
@@ -32,8 +35,8 @@ def edge_samples(
 ) -> Samples:
     """Samples along a target's own edges, at most `support` and at most half an edge away from their vertex.
 
-    Only vertices whose edges are longer than the source's spacing get samples (a dense source on a coarse
-    target aliases; the reverse cannot), and only along edges that stay inside one label.
+    Only edges that are much longer than the source's spacing get samples (a dense source on a coarse target
+    aliases; the reverse cannot), and only along edges that stay inside one label.
 
     Parameters
     ----------
@@ -47,7 +50,7 @@ def edge_samples(
     owner, other = both[:, 0], both[:, 1]
     step = points[other] - points[owner]
     length = np.linalg.norm(step, axis=1)
-    kept = (length > source_spacing[owner]) & (length > 1e-9)
+    kept = (length > DENSER * source_spacing[owner]) & (length > 1e-9)
     owner, other, step, length = owner[kept], other[kept], step[kept], length[kept]
     share = np.minimum(0.5, support / length)[:, None]
     turned = normals[owner] * (1.0 - share) + normals[other] * share
