@@ -21,7 +21,8 @@ from fba.errors import FbaError, InputFileError, MeshError, OutputFileError, Unk
 from fba.scene import FaceScene
 from fba.shapes import ShapeSet
 from formats import gltf, obj
-from formats.files import atomic_output, read_bytes
+from formats.files import read_bytes
+from formats.npz import write_npz
 from formats.text_lines import TextLines
 
 _MOST_BYTES = 4 << 30
@@ -184,8 +185,7 @@ def write_shapes(shapes: ShapeSet, like: FaceScene, path: Path) -> None:
     """
     path = Path(path)
     if path.suffix.lower() == ".npz":
-        with atomic_output(path) as temporary:
-            _write_npz(shapes, temporary)
+        write_npz(path, {"names": np.array(shapes.names), "deltas": shapes.deltas, "neutral": shapes.neutral})
         return
     if path.suffix and not path.is_dir():
         raise UnknownFormatError(f"{path}: morph targets are written to an .npz file or to a folder of OBJ files")
@@ -213,14 +213,3 @@ def write_shapes(shapes: ShapeSet, like: FaceScene, path: Path) -> None:
 
 def _targets(shapes: ShapeSet) -> Iterator[tuple[str, Floats]]:
     return ((name, shapes.neutral + offsets) for name, offsets in zip(shapes.names, shapes.deltas, strict=True))
-
-
-def _write_npz(shapes: ShapeSet, path: Path) -> None:
-    """An .npz with fixed time stamps: the same shapes give the same bytes."""
-    arrays = {"names": np.array(shapes.names), "deltas": shapes.deltas, "neutral": shapes.neutral}
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, array in arrays.items():
-            entry = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            with archive.open(entry, "w", force_zip64=True) as file:
-                np.lib.format.write_array(file, array, allow_pickle=False)

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from fat.conformance import conformance
-
 from cloning import clone_with_report
+from fat.conformance import conformance
 from fat.face import AnimatableFace
 from fba.findings import Finding
 from fba.mesh import PolyMesh

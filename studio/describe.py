@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from fat.validate import validate
 
 from fat.face import AnimatableFace
 from fat.tables import FaceDefTables
+from fat.validate import validate
 from fba.faps import LOW_LEVEL_FAPS, fap
 from fba.fapu import Fapu
 from fba.feature_points import FeaturePoints, standard_feature_points
@@ -126,7 +126,8 @@ def describe_face(face: AnimatableFace) -> tuple[dict[str, object], list[Finding
 
 def mesh_findings(scene: FaceScene) -> list[Finding]:
     """What makes a plain mesh hard to animate."""
-    findings: list[Finding] = []
+    remarks: tuple[str, ...] = getattr(scene.document, "remarks", ())
+    findings = [Finding("info", "reader", remark) for remark in remarks]
     for shape in scene.shapes:
         about = describe_mesh(shape.mesh)
         if about["non_manifold_edges"]:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from formats.npz import write_npz
 from numpy.typing import NDArray
 
 from fat.evaluate import Player
@@ -14,6 +13,7 @@ from fat.face import AnimatableFace
 from fba.errors import OutputFileError
 from fba.orientation import to_file_order
 from fba.stream import FapStream
+from formats.npz import write_npz
 from studio.movie import write_animation
 from studio.render import Figure, make_renderer
 

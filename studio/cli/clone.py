@@ -112,11 +112,10 @@ def _clone_shapes(
     as_published: bool,
     report: Path | None,
 ) -> None:
-    from formats.shapes import read_shapes, write_shapes
-
     from cloning import clone_shapes
     from fba.errors import LandmarkError
     from formats import read
+    from formats.shapes import read_shapes, write_shapes
     from studio.cli.console import console, print_findings, progress
     from studio.inputs import points_of, scene_of
 
