@@ -7,12 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 from pxr import Sdf, Tf, Usd, UsdUtils
 
 from fba.errors import InputFileError, OutputFileError
 from formats.files import atomic_output, read_bytes
+from formats.usd.crate import MAGIC, impossible_count
 
-_MAGIC = (b"#usda", b"#sdf", b"PXR-USDC", b"PK\x03\x04")
+_MAGIC = (b"#usda", b"#sdf", MAGIC, b"PK\x03\x04")
 
 
 @contextmanager
@@ -30,8 +32,10 @@ def reading(path: Path) -> Iterator[None]:
     """Turn what OpenUSD raises about a damaged file into one InputFileError."""
     with quiet():
         try:
-            yield
-        except (Tf.ErrorException, RuntimeError, ValueError, TypeError, OverflowError) as error:
+            # Damaged numbers may overflow; what comes of them is checked where it matters.
+            with np.errstate(all="ignore"):
+                yield
+        except (Tf.ErrorException, RuntimeError, ValueError, TypeError, OverflowError, MemoryError) as error:
             # OpenUSD's own errors; and Python's, where an attribute holds a value of another type than ours.
             raise InputFileError(f"{path} is not a readable USD file: {_first_message(error, path)}") from error
 
@@ -44,8 +48,12 @@ def open_stage(path: Path) -> Usd.Stage:
     InputFileError
         If the file is missing, empty or not USD, or if a file that it refers to cannot be opened.
     """
-    if not read_bytes(path).startswith(_MAGIC):
+    data = read_bytes(path)
+    if not data.startswith(_MAGIC):
         raise InputFileError(f"{path} is not a USD file: it starts neither like .usda text nor like .usdc data")
+    impossible = impossible_count(data)
+    if impossible:
+        raise InputFileError(f"{path} is damaged: {impossible}")
     known = Sdf.Layer.Find(str(path.absolute()))
     if known and not known.dirty:
         # Somebody in this process still holds the file as it was; look whether it has changed since.
@@ -77,6 +85,8 @@ def _first_message(error: Exception, path: Path) -> str:
         whole = str(error)
     except UnicodeDecodeError:
         return "the text is not UTF-8"
+    except MemoryError:
+        return "it asks for more memory than there is"
     found = re.search(r" : '(.*?)'\s*(?:\n|$)", whole, re.DOTALL)
     text = found.group(1) if found else whole
     return _one_line(text.replace(str(path.absolute()), path.name))

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import hashlib
+import struct
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -314,8 +316,18 @@ def test_a_damaged_file_gives_one_line(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.fixture
+def little_memory() -> Iterator[None]:
+    """OpenUSD may ask for any amount of memory for damaged data; 8 GB are enough to be refused in time."""
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (8 << 30, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_AS, before)
+
+
 @pytest.mark.parametrize("extension", ["usda", "usdc"])
-def test_no_cut_or_changed_byte_brings_the_reader_down(tmp_path: Path, extension: str) -> None:
+def test_no_cut_or_changed_byte_brings_the_reader_down(tmp_path: Path, extension: str, little_memory: None) -> None:
     whole = tmp_path / f"face.{extension}"
     usd.write(small_face(), whole)
     data = whole.read_bytes()
@@ -335,6 +347,20 @@ def test_no_cut_or_changed_byte_brings_the_reader_down(tmp_path: Path, extension
         except FbaError:
             refused += 1
     assert refused > 20
+
+
+@pytest.mark.parametrize("section", [b"TOKENS", b"STRINGS", b"FIELDS", b"FIELDSETS", b"PATHS", b"SPECS"])
+def test_a_binary_file_cannot_ask_for_all_memory(tmp_path: Path, section: bytes) -> None:
+    path = tmp_path / "face.usdc"
+    usd.write(small_face(), path)
+    data = bytearray(path.read_bytes())
+    (table,) = struct.unpack_from("<q", data, 16)
+    entry = data.index(section + b"\0", table)
+    (start,) = struct.unpack_from("<q", data, entry + 16)
+    data[start + 4] = 0x7F
+    path.write_bytes(data)
+    with pytest.raises(InputFileError, match=section.decode()):
+        usd.read(path)
 
 
 def test_lost_attributes_are_named(tmp_path: Path) -> None:
