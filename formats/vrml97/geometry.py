@@ -309,11 +309,13 @@ def carried_colors(
         per_face = np.arange(len(palette), dtype=np.int32) if own is None else own
         if cut.face_rows.size and (cut.face_rows[-1] >= per_face.size or per_face[cut.face_rows].max() >= len(palette)):
             return {}
-        by_corners = {tuple(sorted(old.face(k))): per_face[r] for k, r in enumerate(cut.face_rows)}
-        wanted = [by_corners.get(tuple(sorted(rows[new.face(k)]))) for k in range(new.face_count)]
-        if any(k is None for k in wanted):
+        covered = np.zeros(old.vertex_count, dtype=bool)
+        covered[rows] = True
+        kept = np.flatnonzero(np.logical_and.reduceat(covered[old.indices], old.offsets[:-1]))
+        corners = np.repeat(np.isin(np.arange(old.face_count), kept), old.arities)
+        if not np.array_equal(old.indices[corners], rows[new.indices]):
             return {}
-        chosen = palette[np.array(wanted, dtype=np.int32)]
+        chosen = palette[per_face[cut.face_rows[kept]]]
     return {
         "color": Nodes((node("Color", color=numbers(chosen)),)),
         "colorPerVertex": Booleans((flag(faces, "colorPerVertex", True),)),

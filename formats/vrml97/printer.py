@@ -166,7 +166,8 @@ def number_words(values: Floats, *, bt: bool = False) -> list[str]:
     whole = np.all((values == np.rint(values)) & (np.abs(values) < 2**53) & ~((values == 0) & np.signbit(values)))
     if whole:
         return list(map(str, values.astype(np.int64).tolist()))
-    words = [w[:-2] if w.endswith(".0") else w for w in map(repr, values.tolist())]
+    # One call for the whole list is several times faster than one for each number.
+    words = (repr(values.tolist())[1:-1] + ",").replace(".0,", ",")[:-1].split(", ")
     if not np.all(np.isfinite(values)):
         infinity = {"inf": "+I", "-inf": "-I"} if bt else {"inf": "1e999", "-inf": "-1e999"}
         words = [infinity.get(w, w) for w in words]

@@ -249,6 +249,21 @@ def test_a_shape_cut_into_skin_and_eye_keeps_its_look(tmp_path: Path) -> None:
         assert np.allclose(color.get("color").values[::3], np.array(rows) / 10)  # type: ignore[union-attr]
 
 
+def test_colors_of_polygons_go_with_the_polygons(tmp_path: Path) -> None:
+    colors = "Color { color [ 1 0 0, 0 1 0, 0 0 1 ] }"
+    fields = {"color": colors, "colorPerVertex": "FALSE", "colorIndex": "[ 2 0 1 ]"}
+    fields["coordIndex"] = "[ 0 1 2 -1 1 2 3 -1 0 2 3 ]"
+    scene = read_scene(tmp_path, HEADER + "DEF A Shape { " + face_set(**fields) + " }")
+    part, _ = scene.shapes[0].mesh.submesh(np.array([False, True, True, True]))
+    cut = replace(scene, roots=(Shape("part", part),))
+    geometry = definitions(parse(to_text(cut)))["part"].nodes("geometry")[0]
+    assert isinstance(geometry, VrmlNode)
+    color = geometry.nodes("color")[0]
+    assert isinstance(color, VrmlNode)
+    assert color.get("color").values.tolist() == [1, 0, 0]  # type: ignore[union-attr]
+    assert not geometry.get("colorPerVertex").values[0]  # type: ignore[union-attr]
+
+
 def test_a_shape_that_is_gone_stays_where_it_was_used_again(tmp_path: Path) -> None:
     scene = read_scene(tmp_path, FULL)
     head = scene.roots[0]
