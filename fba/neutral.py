@@ -14,7 +14,7 @@ import numpy as np
 from fba.arrays import Floats
 from fba.fapu import FAPU_DIVISOR, Fapu
 from fba.feature_points import FeaturePoints
-from fba.findings import Finding, Severity
+from fba.findings import Finding
 from fba.landmark_checks import pairs
 from fba.scene import FaceScene, Role
 from fba.sphere import fit_sphere
@@ -29,12 +29,9 @@ CORNER_TOLERANCE = 50.0
 TEETH_TOLERANCE = 30.0
 """MNS/1024."""
 
-IRIS_SHARE = (0.25, 0.65)
-"""Lid opening / eyeball diameter at which lids pass for tangent to the iris. A human iris has 11.7 mm, an eyeball
-24 mm, which is 0.49; the range leaves room for models with larger eyeballs (MakeHuman's have 30 mm: 0.29 to 0.34)."""
-
-IRIS_PER_EYE_SEPARATION = (0.12, 0.26)
-"""The same against the eye separation (63 mm, so 0.19), for faces without eyeball shapes."""
+IRIS_PER_EYE_SEPARATION = (0.138, 0.241)
+"""Lid opening / eye separation at which lids pass for tangent to the iris: human irises have 10.2 to 13.0 mm, human
+pupils are 54 to 74 mm apart. The eyeball is no measure: models have eyeballs of any size below the skin."""
 
 PUPIL_TOLERANCE = 0.25
 """IRISD by which a pupil may lie off the middle between the lids."""
@@ -142,24 +139,22 @@ def _eyeball(scene: FaceScene, role: Role) -> tuple[Floats, float] | None:
 def _lids(scene: FaceScene, at: _Points, fapu: Fapu) -> list[Finding]:
     findings = []
     gaps = []
-    for side, role, _, upper, lower in _EYES:
+    for side, _, _, upper, lower in _EYES:
         if not _has(at, upper, lower):
             continue
         gap = float(at[upper][1] - at[lower][1])
         gaps.append(gap)
-        ball = _eyeball(scene, role)
-        size, (low, high), name, usual = fapu.es0, IRIS_PER_EYE_SEPARATION, "the eye separation", 0.19
-        severity: Severity = "info"
-        if ball is not None:
-            size, (low, high), name, usual, severity = 2.0 * ball[1], IRIS_SHARE, "the eyeball", 0.49, "warning"
-        if not low <= gap / size <= high:
-            wide = "wide" if gap / size > high else "narrow"
+        low, high = IRIS_PER_EYE_SEPARATION
+        share = gap / fapu.es0
+        if not low <= share <= high:
+            wide = "wide" if share > high else "narrow"
             message = (
-                f"the {side} eye is open {gap:.4g} mesh units, {gap / size:.2f} of {name}; lids tangent to a human "
-                f"iris give {usual}. The lids look {wide}, and lid motions are scaled by this opening (IRISD0): they "
-                f"will be too {'large' if wide == 'wide' else 'small'} unless the eyes are stylised on purpose"
+                f"the {side} eye is open {gap:.4g} mesh units, {share:.2f} of the eye separation; lids tangent to a "
+                f"human iris give {low:.2f} to {high:.2f}. The lids look {wide}, and lid motions are scaled by this "
+                f"opening (IRISD0): they will be too {'large' if wide == 'wide' else 'small'} unless the eyes are "
+                "stylised on purpose"
             )
-            findings.append(Finding(severity, "lid-opening", message, upper))
+            findings.append(Finding("warning", "lid-opening", message, upper))
     if len(gaps) == 2 and abs(gaps[0] - gaps[1]) > 0.1 * max(gaps):
         message = (
             f"the left eye is open {gaps[0]:.4g} mesh units, the right one {gaps[1]:.4g}; both use their mean as IRISD0"

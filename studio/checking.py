@@ -16,6 +16,7 @@ from fat.motion import FaceMotion
 from fat.quality import fap_error, fap_values, feature_point_motion, flips, lid_gap, lip_gap_change
 from fat.validate import validate
 from fba.arrays import Floats
+from fba.faps import LOW_LEVEL_FAPS
 from fba.findings import Finding
 from fba.scene import Role
 
@@ -35,12 +36,14 @@ class Fidelity:
     """A clone beside its source; means and worst values over the motions that both have.
 
     fp_error : relative error over all feature points and FAP axes (0.01 = 1 %).
+    unasked : motions whose feature points stay still on the source, but not on the clone.
     lip_gap : largest change of the lips' opening in MNS.
     lid_gap : how much wider the worse eye stays open after a blink, in IRISD; None without eyelid FAPs.
     flips : percent of moving skin triangles turned by more than 90 degrees.
     """
 
     motions: int
+    unasked: tuple[str, ...]
     fp_error_mean: float
     fp_error_worst: float
     fp_error_worst_motion: str
@@ -58,20 +61,28 @@ class Fidelity:
             ("lid-gap", self.lid_gap or 0.0, LID_GAP_MUST, "eyes stay open after a blink, IRISD beyond the source"),
             ("flips", self.flips_mean - self.source_flips_mean, FLIPS_MUST, "% of triangles flip beyond the source's"),
         ]
-        return [
+        findings = [
             Finding("error", code, f"{text}: {value:.3g}, at most {limit:g}")
             for code, value, limit, text in rows
             if value > limit
+        ]
+        return findings + [
+            Finding("error", "unasked", "feature points move that are still on the source", name)
+            for name in self.unasked
         ]
 
 
 @dataclass(frozen=True, eq=False)
 class CheckResult:
-    """What `fba check` prints."""
+    """What `fba check` prints.
+
+    unmeasured : low-level FAPs with a table, but without a feature point to measure them at.
+    """
 
     findings: tuple[Finding, ...]
     neutral_unchanged: bool
     faps: tuple[FapConformance, ...]
+    unmeasured: tuple[str, ...]
     fidelity: Fidelity | None
 
     @cached_property
@@ -97,6 +108,7 @@ class CheckResult:
             "neutral_unchanged": self.neutral_unchanged,
             "findings": [asdict(f) for f in (*self.problems, *self.findings)],
             "faps": [{**asdict(f), "relative_error": f.relative_error, "passed": f.passed} for f in self.faps],
+            "unmeasured": list(self.unmeasured),
             "fidelity": asdict(self.fidelity) if self.fidelity else None,
         }
 
@@ -105,12 +117,13 @@ def check_face(face: AnimatableFace, source: AnimatableFace | None = None) -> Ch
     """Check a face; tables that cannot be played are reported, not measured."""
     findings = tuple(validate(face))
     if any(f.severity == "error" for f in findings):
-        return CheckResult(findings, True, (), None)
+        return CheckResult(findings, True, (), (), None)
     neutral = Player(face).pose().local
     unchanged = all(neutral[s.name].tobytes() == s.mesh.vertices.tobytes() for s in face.scene.shapes)
-    return CheckResult(
-        findings, unchanged, tuple(conformance(face)), None if source is None else fidelity(face, source)
-    )
+    measured = tuple(conformance(face))
+    seen = {fap.fap_id for fap in measured}
+    unmeasured = tuple(t.name for t in face.tables if t.fap_id in LOW_LEVEL_FAPS and t.fap_id not in seen)
+    return CheckResult(findings, unchanged, measured, unmeasured, None if source is None else fidelity(face, source))
 
 
 def fidelity(face: AnimatableFace, source: AnimatableFace) -> Fidelity | None:
@@ -131,6 +144,7 @@ def fidelity(face: AnimatableFace, source: AnimatableFace) -> Fidelity | None:
     lip = max(lips, key=lambda k: lips[k])
     return Fidelity(
         len(common),
+        tuple(name for name in errors if name not in finite),
         float(np.mean(list(finite.values()))) if finite else 0.0,
         finite.get(worst, 0.0),
         worst,

@@ -18,7 +18,6 @@ from fba.mesh import PolyMesh
 from fba.neutral import check_neutral
 from fba.scene import FaceScene, Shape
 from fba.stream import FapStream
-from fba.units import guess_unit
 
 
 def describe_mesh(mesh: PolyMesh) -> dict[str, object]:
@@ -92,9 +91,6 @@ def describe_points(scene: FaceScene, points: FeaturePoints) -> tuple[dict[str, 
         measured = Fapu.from_feature_points(points.positions(scene))
         fapu = describe_fapu(measured)
         findings += check_neutral(scene, points, measured)
-        guess = guess_unit(measured.es0)
-        if scene.meters_per_unit is None and guess is not None:
-            findings.append(Finding("info", "unit", f"by the eye separation, one unit is about one {guess}"))
     except LandmarkError as error:
         findings.append(Finding("error", "fapu", str(error)))
     known = standard_feature_points()

@@ -36,6 +36,8 @@ def check(
         if result.fidelity is not None:
             for name, value in result.to_dict()["fidelity"].items():  # type: ignore[attr-defined]
                 out.print(f"{name}: {value:.4g}" if isinstance(value, float) else f"{name}: {value}")
+        if result.unmeasured:
+            out.print("not measured, for lack of a feature point on a surface: " + ", ".join(result.unmeasured))
         print_findings((*result.problems, *result.findings), out)
         out.print("passed" if result.passed else "FAILED")
     if not result.passed:

@@ -63,7 +63,7 @@ def test_a_neutral_face_gives_no_findings() -> None:
         ({**moved("2.3", y=-0.001), **moved("2.6", y=0.002)}, "lip-gap", "51 at 2.2/2.3 (0.001), 102 at 2.6/2.8"),
         (moved("2.7", y=-0.001), "lip-overlap", "by 51 at 2.7/2.9 (0.001)"),
         ({**moved("2.4", y=-0.002), **moved("2.5", y=-0.003)}, "lip-corners", "2.5 lies 154 MNS/1024"),
-        ({"3.1": (0.0315, 0.0095, 0), "3.3": (0.0315, -0.0095, 0)}, "lid-opening", "0.79 of the eyeball"),
+        ({"3.1": (0.0315, 0.0095, 0), "3.3": (0.0315, -0.0095, 0)}, "lid-opening", "0.30 of the eye separation"),
         ({"3.2": (-0.0315, 0.0025, 0), "3.4": (-0.0315, -0.0025, 0)}, "lid-opening", "narrow"),
         ({"3.2": (-0.0315, 0.0051, 0), "3.4": (-0.0315, -0.0051, 0)}, "lids-uneven", "left eye is open 0.0116"),
         (moved("3.5", y=0.004), "pupil-height", "0.34 lid openings above"),
