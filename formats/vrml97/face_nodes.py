@@ -12,7 +12,7 @@ from fba.arrays import Floats, Ints
 from fba.errors import FaceDefTablesError, FbaError, LandmarkError
 from fba.faps import EXPRESSION_FAP, LOW_LEVEL_FAPS, VISEME_FAP, fap
 from fba.feature_points import standard_feature_points
-from fba.scene import FaceScene, Frame
+from fba.scene import FaceScene, Frame, Shape
 from formats.vrml97.axes import turn_axis, turn_point, turn_sizes
 from formats.vrml97.geometry import Definitions, child, fixed, resolve, values_of
 from formats.vrml97.printer import shortest_float32
@@ -189,7 +189,10 @@ class TableReader:
         self.scene_names = scene_names
         self.geometry_names = geometry_names
         self.shapes = {s.name: s for s in scene.shapes}
-        self.transforms = {t.name: t for t in scene.transforms}
+        self.below: dict[str, list[str]] = {t.name: [] for t in scene.transforms}
+        for part, above in scene.walk():
+            for transform in above if isinstance(part, Shape) else ():
+                self.below[transform.name].append(part.name)
 
     def read(self, fdp: VrmlNode) -> FaceDefTables:
         """All tables; several for one FAP are put together.
@@ -258,7 +261,7 @@ class TableReader:
 
     def transform(self, entry: VrmlNode) -> FaceDefTransform:
         name = self.scene_names.get(self.target(entry) or "")
-        if name not in self.transforms:
+        if name not in self.below:
             raise FaceDefTablesError(f"line {entry.line}: this FaceDefTransform does not refer to a Transform by USE")
         field = self.integer(entry, "fieldId", 1)
         if field not in (1, 2, 3):
@@ -285,8 +288,8 @@ class TableReader:
         name = self.scene_names.get(target or "", self.geometry_names.get(target or ""))
         if name in self.shapes:
             return name
-        if name in self.transforms:
-            below = [s.name for s in self.shapes.values() if any(t.name == name for t in self.scene.parents(s.name))]
+        if name in self.below:
+            below = self.below[name]
             if len(below) == 1:
                 return below[0]
             raise FaceDefTablesError(

@@ -23,7 +23,7 @@ from formats.vrml97.geometry import (
     same_mesh,
     shape_node,
 )
-from formats.vrml97.names import escape, unique
+from formats.vrml97.names import Names, escape
 from formats.vrml97.references import definitions_first
 from formats.vrml97.scene import CHILD_FIELDS, child_field, places_children, set_transform_fields
 from formats.vrml97.tree import Nodes, Route, Statement, Strings, VrmlNode, definitions, node, number
@@ -57,14 +57,13 @@ class _Merger:
         outgoing = [n for n, _ in scene.walk()]
         self.alive = {id(known) for known in map(self.known, outgoing) if known is not None}
         self.def_names: dict[str, str] = {}
-        taken = {*self.defs, METADATA_DEF}
+        free = Names([*self.defs, METADATA_DEF])
         for part in outgoing:
             known = self.known(part)
             if known is not None and known.def_name is not None:
                 self.def_names[part.name] = known.def_name
             else:
-                self.def_names[part.name] = unique(escape(part.name), taken)
-                taken.add(self.def_names[part.name])
+                self.def_names[part.name] = free.give(escape(part.name))
 
     def known(self, part: Node) -> VrmlNode | None:
         """The document's node of this name and kind."""
@@ -80,13 +79,13 @@ class _Merger:
         """
         at: dict[int, list[Node]] = {}
         loose: list[Node] = []
+        position = {id(item): k for k, item in enumerate(items)}
         for part in outgoing:
-            covered = self.cover(part)
-            first = next((k for k, item in enumerate(items) if id(item) in covered), None)
-            if first is None:
-                loose.append(part)
+            covered = [position[i] for i in self.cover(part) if i in position]
+            if covered:
+                at.setdefault(min(covered), []).append(part)
             else:
-                at.setdefault(first, []).append(part)
+                loose.append(part)
         if loose:
             vacant = (k for k, item in enumerate(items) if id(item) in self.names and id(item) not in self.alive)
             at.setdefault(next(vacant, len(items)), []).extend(loose)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container
+from collections.abc import Iterable
 
 _ESCAPED = re.compile(r"_x([0-9a-f]{2,6})_")
 _PLAIN = re.compile(r"[A-Za-z0-9_]")
@@ -44,15 +44,24 @@ def unescape(name: str) -> str:
     return _ESCAPED.sub(character, name)
 
 
-def unique(name: str, taken: Container[str]) -> str:
-    """The name itself, or with the first free number behind it.
+class Names:
+    """Gives every name once.
 
-    >>> unique("eye", {"eye", "eye_2"})
-    'eye_3'
+    >>> names = Names(["eye"])
+    >>> names.give("eye"), names.give("eye"), names.give("ear")
+    ('eye_2', 'eye_3', 'ear')
     """
-    if name not in taken:
-        return name
-    k = 2
-    while f"{name}_{k}" in taken:
-        k += 1
-    return f"{name}_{k}"
+
+    def __init__(self, taken: Iterable[str] = ()) -> None:
+        self._taken = set(taken)
+        self._next: dict[str, int] = {}
+
+    def give(self, name: str) -> str:
+        """The name itself, or with the first free number behind it."""
+        given = name
+        while given in self._taken:
+            number = self._next.get(name, 2)
+            self._next[name] = number + 1
+            given = f"{name}_{number}"
+        self._taken.add(given)
+        return given

@@ -164,18 +164,30 @@ def _with_roles(scene: FaceScene, tables: FaceDefTables) -> FaceScene:
             bent[mesh.shape] = bent.get(mesh.shape, 0) + 1
         if table.fap_id in _EYE_FAPS:
             turned = {t.transform for t in table.transforms}
-            for shape in scene.shapes:
-                if any(p.name in turned for p in scene.parents(shape.name)):
-                    roles[shape.name] = _EYE_FAPS[table.fap_id]
+            for part, above in scene.walk():
+                if isinstance(part, Shape) and any(t.name in turned for t in above):
+                    roles[part.name] = _EYE_FAPS[table.fap_id]
     skin = [name for name in bent if name not in roles]
     if skin:
         roles[max(skin, key=lambda n: (bent[n], n))] = Role.SKIN
     return scene.map_shapes({s.name: replace(s, role=roles[s.name]) for s in scene.shapes if s.name in roles})
 
 
-def _diagonal(scene: FaceScene) -> float:
-    world = scene.world_neutral()
-    return float(np.linalg.norm(world.max(axis=0) - world.min(axis=0))) if len(world) else 0.0
+def _world(scene: FaceScene) -> dict[str, Floats]:
+    """World vertices of every shape, in one walk."""
+    found: dict[str, Floats] = {}
+    for part, above in scene.walk():
+        if isinstance(part, Shape):
+            matrix = np.eye(4)
+            for transform in above:
+                matrix = matrix @ transform.matrix()
+            found[part.name] = part.mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    return found
+
+
+def _diagonal(world: Mapping[str, Floats]) -> float:
+    points = np.concatenate(list(world.values()))
+    return float(np.linalg.norm(points.max(axis=0) - points.min(axis=0))) if len(points) else 0.0
 
 
 def _checked_points(
@@ -190,8 +202,9 @@ def _checked_points(
         for p in points.values()
     )
     if fits:
-        near = _DRIFT * _diagonal(scene)
-        here = points.positions(scene)
+        world = _world(scene)
+        near = _DRIFT * _diagonal(world)
+        here = points.positions(scene, world)
         given = {i: scene.frame.from_file(p) for i, p in positions.items()}
         fits = all(float(np.linalg.norm(here[i] - given[i])) <= near for i in here if i in given)
     if fits:
@@ -203,12 +216,13 @@ def _checked_points(
 
 def _snapped(scene: FaceScene, positions: Mapping[str, Floats]) -> FeaturePoints:
     """Points on the nearest surface where one is close, free points otherwise."""
+    world = _world(scene)
     surfaces = []
     for shape in scene.shapes:
         if shape.mesh.face_count:
             triangles = shape.mesh.triangles
-            surfaces.append((shape.name, triangles, TriangleSearch(scene.world_vertices(shape.name), triangles)))
-    near = _ON_SURFACE * _diagonal(scene)
+            surfaces.append((shape.name, triangles, TriangleSearch(world[shape.name], triangles)))
+    near = _ON_SURFACE * _diagonal(world)
     found: dict[str, FeaturePoint] = {}
     for key, position in positions.items():
         hits = [(search.closest(position), name, triangles) for name, triangles, search in surfaces]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from fba.errors import UnsupportedFeatureError
-from formats.vrml97.names import unique
+from formats.vrml97.names import Names
 from formats.vrml97.parser import MAX_DEPTH
 from formats.vrml97.tree import (
     Field,
@@ -25,9 +25,9 @@ from formats.vrml97.tree import (
 def unique_definitions(statements: tuple[Statement, ...]) -> tuple[Statement, ...]:
     """Rename the second and later DEFs of a name; USE and ROUTE follow (they mean the nearest DEF before them)."""
     names = [n.def_name for n in walk(statements) if isinstance(n, VrmlNode) and n.def_name is not None]
-    taken = set(names)
-    if len(taken) == len(names):
+    if len(set(names)) == len(names):
         return statements
+    free = Names(names)
     seen: set[str] = set()
     current: dict[str, str] = {}
 
@@ -42,8 +42,7 @@ def unique_definitions(statements: tuple[Statement, ...]) -> tuple[Statement, ..
         name = item.def_name
         if name is not None:
             if name in seen:
-                current[name] = unique(name, taken)
-                taken.add(current[name])
+                current[name] = free.give(name)
                 name = current[name]
             seen.add(name)
         return replace(item, def_name=name, body=_body(item, visit))

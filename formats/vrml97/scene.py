@@ -13,7 +13,7 @@ from typing import Any
 from fba.findings import Finding
 from fba.scene import Node, Shape, Transform
 from formats.vrml97.geometry import Definitions, child, fixed, material_of, mesh_of
-from formats.vrml97.names import unescape, unique
+from formats.vrml97.names import Names, unescape
 from formats.vrml97.tree import Nodes, Numbers, Statement, Use, VrmlNode, number
 
 CHILD_FIELDS = {
@@ -57,7 +57,7 @@ class SceneReader:
         self.findings = findings
         self.nodes: dict[str, VrmlNode] = {}
         self.parts: dict[str, Node] = {}
-        self.names = {unescape(name) for name in defs}
+        self.free = Names(unescape(name) for name in defs)
         self.given: set[str] = set()
         self.seen: set[int] = set()
 
@@ -84,10 +84,9 @@ class SceneReader:
         self.findings.append(Finding("info" if severity == "info" else "warning", code, message, where))
 
     def name(self, item: VrmlNode) -> str:
-        if item.def_name is not None:
-            name = unique(unescape(item.def_name), self.given)
-        else:
-            name = unique(item.type.lower(), self.given | self.names)
+        name = unescape(item.def_name) if item.def_name is not None else self.free.give(item.type.lower())
+        if name in self.given:
+            name = self.free.give(name)
         self.given.add(name)
         return name
 
@@ -109,7 +108,6 @@ class SceneReader:
         where = child_field(item)
         if where is None:
             return None
-        name = self.name(item) if item.def_name is not None else None
         shown = item.nodes(where)
         if item.type == "LOD":
             shown = shown[:1]
@@ -118,10 +116,8 @@ class SceneReader:
             shown = shown[choice : choice + 1] if choice >= 0 else ()
         children = [c for c in (self.visit(n) for n in shown) if c is not None]
         if not children and (item.def_name is None or item.def_name not in self.keep):
-            if name is not None:
-                self.given.discard(name)
             return None
-        part = Transform(name if name is not None else self.name(item), tuple(children))
+        part = Transform(self.name(item), tuple(children))
         if places_children(item):
             part = replace(part, **transform_fields(item))
         return self.register(part, item)

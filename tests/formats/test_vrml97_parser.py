@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fba.errors import FbaError, InputFileError, VrmlSyntaxError
+from formats.bt import read as read_bt
 from formats.vrml97 import parse, print_tree, read
 from formats.vrml97 import text as vrml_text
 from formats.vrml97.names import escape, unescape
@@ -246,6 +247,17 @@ def test_doubling_use_is_read_once(tmp_path: Path) -> None:
     assert scene.vertex_count == 3  # type: ignore[union-attr]
 
 
+def test_thousands_of_equal_and_missing_names_are_quick(tmp_path: Path) -> None:
+    path = tmp_path / "a.wrl"
+    shape = "Shape { geometry IndexedFaceSet { coord USE C coordIndex [0 1 2] } }\n"
+    first = shape.replace("USE C", "DEF C Coordinate { point [0 0 0 1 0 0 0 1 0] }")
+    path.write_text("#VRML V2.0 utf8\n" + first + ("DEF A " + shape + shape + "DEF G Group { }\n") * 5000)
+    start = time.perf_counter()
+    scene = read(path)
+    assert time.perf_counter() - start < 10
+    assert len(scene.shapes) == 10001  # type: ignore[union-attr]
+
+
 def test_too_many_nodes_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("formats.vrml97.parser.MAX_ITEMS", 1000)
     with pytest.raises(VrmlSyntaxError, match="more than 1000 nodes"):
@@ -318,6 +330,22 @@ def test_damaged_files_raise_nothing_but_our_errors(tmp_path: Path, data: st.Dat
     path.write_text(text, encoding="utf-8")
     with contextlib.suppress(FbaError):
         read(path)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_damaged_bt_raises_nothing_but_our_errors(tmp_path: Path, data: st.DataObject) -> None:
+    path = tmp_path / "a.bt"
+    text = SMALL + 'AT 40 { REPLACE T.translation BY 1 2 3 }\nUPDATE OD [ ObjectDescriptor { url "a]" } ]\n'
+    path.write_text(text)
+    read_bt(path)
+    for _ in range(data.draw(st.integers(1, 3))):
+        start = data.draw(st.integers(0, len(text)))
+        end = min(len(text), start + data.draw(st.integers(0, 40)))
+        text = text[:start] + data.draw(st.sampled_from([*TOKENS, "AT", "UPDATE", "REPLACE"])) + text[end:]
+    path.write_text(text, encoding="utf-8")
+    with contextlib.suppress(FbaError):
+        read_bt(path)
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
