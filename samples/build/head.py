@@ -14,6 +14,7 @@ from fba.fapu import Fapu
 from fba.feature_points import NECK_BASE, FeaturePoint, FeaturePoints
 from fba.mesh import Material, PolyMesh
 from fba.scene import FaceScene, Role, Shape
+from fba.sphere import fit_sphere
 from samples.build.crop import PARTS, HeadCrop, crop_head
 from samples.build.eyeball import eyeball
 from samples.build.makehuman import MakeHuman
@@ -76,7 +77,8 @@ class Head:
         found = {}
         for shape, _, group, _ in EYES:
             ball = self.body[np.unique(self.makehuman.base.quads[groups[group]])]
-            found[shape] = fit_sphere(ball)
+            center, radius, _ = fit_sphere(ball)
+            found[shape] = (center, radius)
         return found
 
     @cached_property
@@ -173,14 +175,6 @@ def macro(race: str, sex: str, age: str, weight: float) -> dict[tuple[str, str],
         ("macrodetails", f"{race}-{sex}-{age}"): weight,
         ("macrodetails", f"universal-{sex}-{age}-averagemuscle-averageweight"): weight,
     }
-
-
-def fit_sphere(points: Floats) -> tuple[Floats, float]:
-    """Least-squares sphere through (n, 3) points: centre and radius."""
-    system = np.column_stack([2.0 * points, np.ones(len(points))])
-    solution = np.linalg.lstsq(system, (points**2).sum(axis=1), rcond=None)[0]
-    center: Floats = solution[:3]
-    return center, float(np.sqrt(solution[3] + center @ center))
 
 
 def _point_rows() -> dict[str, dict[str, list[float]]]:

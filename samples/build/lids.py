@@ -18,7 +18,7 @@ LID_REACH = 0.1
 CORNER = 0.25
 """Share of the opening's width over which the correction fades towards each corner."""
 CLEARANCE = 1.01
-"""Skin that lies on the eyeball stays at least this far from its centre, in radii."""
+"""Skin that lies on the eyeball stays this far from its centre (radii), or as far as it is in the neutral face."""
 OUTSIDE = 0.99
 """Skin nearer to the centre than this (radii) in the neutral face is the inside of the socket."""
 PASSES = 5
@@ -59,11 +59,13 @@ class Lid:
         """Push skin that would enter the eyeball forward along the gaze; heights stay."""
         center, radius = self.head.eye_centers[f"eye_{self.side}"]
         rest = self.head.parts["skin"]
-        covers = np.linalg.norm(rest - center, axis=1) >= OUTSIDE * radius
+        away = np.linalg.norm(rest - center, axis=1)
+        kept = np.minimum(away, CLEARANCE * radius)
         moved = rest + skin
         across = np.linalg.norm(moved[:, :2] - center[:2], axis=1)
-        front = center[2] + np.sqrt(np.maximum((CLEARANCE * radius) ** 2 - across**2, 0.0))
-        enters = covers & (across < CLEARANCE * radius) & (rest[:, 2] > center[2]) & (moved[:, 2] < front)
+        front = center[2] + np.sqrt(np.maximum(kept**2 - across**2, 0.0))
+        covers = (away >= OUTSIDE * radius) & (rest[:, 2] > center[2]) & skin.any(axis=1)
+        enters = covers & (across < kept) & (moved[:, 2] < front)
         out = skin.copy()
         out[enters, 2] += (front - moved[:, 2])[enters]
         return out

@@ -99,7 +99,7 @@ def _sided(k: int, side: str) -> list[Recipe]:
         ),
         Recipe(21 + k, (Border(512, {f"eyeSquint{side}": 1.0}),), carried=LIDS, lid=(half, "lower")),
         Recipe(37 + k, (Border(100, {f"browDown{side}": 1.0}, axes="x"),), carried=LIDS),
-        Recipe(41 + k, (Border(200, {f"cheekSquint{side}": 1.0}),), carried=LIDS),
+        Recipe(41 + k, (Border(140, {f"cheekSquint{side}": 1.0}),), carried=LIDS),
     ]
 
 

@@ -49,7 +49,7 @@ class MotionBuilder:
         """All borders of one FAP."""
         motions = [self._border(recipe, border) for border in recipe.borders]
         if recipe.lid is None:
-            return motions
+            return [replace(m, offsets=self.over_eyeballs(dict(m.offsets))) for m in motions]
         lid = Lid(self.head, *recipe.lid)
         return [step for motion in motions for step in self._lid_steps(lid, motion)]
 
@@ -59,6 +59,8 @@ class MotionBuilder:
         if motion.value < 0:
             return [motion]
         skin = lid.closing(full["skin"], motion.value)
+        own = fap(motion.fap_id or 0).feature_points[0]
+        skin *= self.correction.at(own, full["skin"])[1] / self.correction.at(own, skin)[1]
         steps = []
         for value in range(LID_STEP, motion.value + 1, LID_STEP):
             share = value / motion.value
