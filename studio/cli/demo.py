@@ -27,14 +27,15 @@ def demo(
     out = console()
     table(
         "Three plain heads, made animatable",
-        ("head", ">vertices", "polygons", ">tables", ">worst own-FP error", ">cloned in"),
+        ("head", ">vertices", "polygons", ">tables", ">own FP, worst error", ">all FPs, error", ">cloned in"),
         [
             (
                 r.head,
                 f"{r.vertices:,}",
                 r.polygons,
                 str(r.tables),
-                f"{100 * r.worst_own:.2f} %",
+                f"{100 * r.worst_own:.3f} %",
+                f"{100 * r.fp_error:.3f} %",
                 f"{r.seconds:.1f} s",
             )
             for r in rows
