@@ -210,10 +210,11 @@ def apply_to_shape(shape: Shape, row: Mapping[str, Any], findings: list[Finding]
     try:
         mesh = shape.mesh
         changes: dict[str, Any] = {}
-        for name in ("face_groups", "face_materials"):
+        materials = tuple(_material(m) for m in row["materials"])
+        groups = changes["group_names"] = tuple(str(n) for n in row.get("group_names", ()))
+        for name, low, count in (("face_groups", 0, len(groups) or mesh.face_count), ("face_materials", -1, len(materials))):
             if name in row:
-                changes[name] = _unrun(row[name], mesh.face_count)
-        changes["group_names"] = tuple(str(n) for n in row.get("group_names", ()))
+                changes[name] = _unrun(row[name], mesh.face_count, low, count)
         for name in ("texcoord", "normal"):
             if f"{name}_none" in row:
                 count = int(row[f"{name}_none"])
@@ -223,7 +224,6 @@ def apply_to_shape(shape: Shape, row: Mapping[str, Any], findings: list[Finding]
         ids = None
         if "vertex_ids" in row:
             ids = _unstep(row["vertex_ids"], mesh.vertex_count)
-        materials = tuple(_material(m) for m in row["materials"])
         fields = {f: getattr(mesh, f) for f in PolyMesh.__dataclass_fields__}
         return Shape(shape.name, PolyMesh(**{**fields, **changes}), Role(row["role"]), materials, ids)
     except (ValueError, TypeError, KeyError, OverflowError, FbaError):
@@ -232,20 +232,22 @@ def apply_to_shape(shape: Shape, row: Mapping[str, Any], findings: list[Finding]
         return shape
 
 
-def _checked(pairs: Any, count: int) -> list[tuple[int, int]]:
+def _checked(pairs: Any, count: int, low: int) -> list[tuple[int, int]]:
     rows = [(int(a), int(b)) for a, b in pairs]
-    if any(b < 0 for _, b in rows) or sum(b for _, b in rows) != count:
+    if any(a < low or b < 0 for a, b in rows) or sum(b for _, b in rows) != count:
         raise ValueError("wrong count")
     return rows
 
 
-def _unrun(pairs: Any, count: int) -> Ints:
-    rows = _checked(pairs, count)
+def _unrun(pairs: Any, count: int, low: int, end: int) -> Ints:
+    rows = _checked(pairs, count, low)
+    if any(a >= end for a, _ in rows):
+        raise ValueError("no such group or material")
     return np.repeat(np.array([a for a, _ in rows], np.int32), [b for _, b in rows])
 
 
 def _unstep(pairs: Any, count: int) -> Ints:
-    rows = _checked(pairs, count)
+    rows = _checked(pairs, count, 0)
     parts = [np.arange(a, a + b, dtype=np.int32) for a, b in rows]
     return np.concatenate(parts) if parts else np.zeros(0, np.int32)
 
