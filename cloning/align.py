@@ -11,6 +11,9 @@ from cloning.labels import OPPOSITE, SIDES
 from cloning.surface import Surface
 from fba.arrays import Floats, Ints
 
+TOUCHING = 1e-3
+"""Anchors nearer than this count as one, in eye separations."""
+
 
 def radial_warp(places: Floats, anchors: Floats, goals: Floats) -> Floats:
     """Move points by the smoothest field that takes each anchor to its goal.
@@ -60,6 +63,16 @@ def points_for_label(ids: Sequence[str], label: int) -> list[str]:
     return [i for i in ids if i not in dropped]
 
 
+def _apart(anchors: Floats, goals: Floats) -> list[int]:
+    """Leave out anchors that touch an earlier one: closed lips and lids would pull one place two ways."""
+    kept: list[int] = []
+    for k in range(len(anchors)):
+        gaps = [np.linalg.norm(places[kept] - places[k], axis=1) for places in (anchors, goals)]
+        if not kept or min(float(gap.min()) for gap in gaps) > TOUCHING:
+            kept.append(k)
+    return kept
+
+
 def align(source: Surface, target: Surface, labels: Ints) -> Floats:
     """Move the target's vertices into the source's space, side by side of the lips and lids.
 
@@ -80,6 +93,7 @@ def align(source: Surface, target: Surface, labels: Ints) -> Floats:
         more = [name for name in shared if not number or yours[name][0] != OPPOSITE[number]]
         anchors = np.array([target.positions[i] for i in some] + [yours[name][1] for name in more])
         goals = np.array([source.positions[i] for i in some] + [mine[name][1] for name in more])
+        kept = _apart(anchors, goals)
         here = labels == number
-        moved[here] = radial_warp(target.vertices[here], anchors, goals)
+        moved[here] = radial_warp(target.vertices[here], anchors[kept], goals[kept])
     return moved

@@ -247,7 +247,7 @@ def _renamed(point: FeaturePoint, moved: Mapping[str, Mapping[int, tuple[str, in
     strongest = places[int(np.argmax(point.weights))]
     assert strongest is not None
     kept = [(p[1], w) for p, w in zip(places, point.weights, strict=True) if p is not None and p[0] == strongest[0]]
-    total = sum(w for _, w in kept)
+    total = 1.0 if len(kept) == len(places) else sum(w for _, w in kept)
     return replace(
         point, shape=strongest[0], vertices=tuple(v for v, _ in kept), weights=tuple(w / total for _, w in kept)
     )

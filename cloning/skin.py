@@ -14,7 +14,7 @@ from cloning.labels import Labels
 from cloning.locate import Places, closest
 from cloning.refine import Refinement, refine
 from cloning.settle import settle
-from cloning.surface import Surface, polygon_edges
+from cloning.surface import Surface
 from fba.arrays import Bools, Floats, Ints
 
 FARTHEST = 0.10
@@ -86,7 +86,7 @@ def build_skin_map(
     fixed = target.point_matrix(anchor_ids(source, target))
     moved, places = settle(target, moved, fixed, locate, FARTHEST, LEAST_FACING)
     normals = target.normals_of(moved)
-    spacing = _spacing(fine)[np.maximum(places.triangles, 0)]
+    spacing = np.einsum("nk,nk->n", places.weights, _spacing(fine)[fine.triangles[places.triangles]])
     extra = edge_samples(moved, normals, target.edges, labels, spacing)
     more = _find(extra.points, extra.normals, labels[extra.owners], fine, fine_labels)
     unmatched = (places.distances > FARTHEST) | (places.facing < LEAST_FACING)
@@ -125,10 +125,12 @@ def _matrix(places: Places, more: Places, owners: Ints, unmatched: Bools, fine: 
 
 
 def _spacing(surface: Surface) -> Floats:
-    """(t,) mean edge length of each triangle."""
-    corners = surface.vertices[surface.triangles]
-    sides: Floats = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)
-    return sides
+    """(n,) mean length of the edges at each vertex."""
+    edges, n = surface.edges, surface.vertex_count
+    length = np.linalg.norm(surface.vertices[edges[:, 0]] - surface.vertices[edges[:, 1]], axis=1)
+    total = np.bincount(edges.ravel(), np.repeat(length, 2), n)
+    spacing: Floats = total / np.maximum(np.bincount(edges.ravel(), minlength=n), 1)
+    return spacing
 
 
 def _refined(source: Surface, labels: Ints, target: Surface) -> tuple[tuple[Refinement, ...], Surface, Ints]:
@@ -166,7 +168,7 @@ def _inherit(step: Refinement, labels: Ints) -> Ints:
 
 def _face_spacing(surface: Surface) -> float:
     """Median edge length within 1.2 eye separations of the nose tip (of the whole skin where there is none)."""
-    edges = surface.edges if surface.shapes else polygon_edges(*surface.polygons)
+    edges = surface.edges
     middle = 0.5 * (surface.vertices[edges[:, 0]] + surface.vertices[edges[:, 1]])
     length = np.linalg.norm(surface.vertices[edges[:, 0]] - surface.vertices[edges[:, 1]], axis=1)
     tip = surface.positions.get("9.3")
