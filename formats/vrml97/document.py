@@ -38,6 +38,11 @@ class VrmlDocument:
     face_fields: tuple[Field, ...] = ()
     findings: tuple[Finding, ...] = ()
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The findings as sentences."""
+        return tuple(f"{f.where}: {f.message}" if f.where else f.message for f in self.findings)
+
 
 @dataclass(frozen=True, eq=False)
 class Split:

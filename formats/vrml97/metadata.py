@@ -212,7 +212,8 @@ def apply_to_shape(shape: Shape, row: Mapping[str, Any], findings: list[Finding]
         changes: dict[str, Any] = {}
         materials = tuple(_material(m) for m in row["materials"])
         groups = changes["group_names"] = tuple(str(n) for n in row.get("group_names", ()))
-        for name, low, count in (("face_groups", 0, len(groups) or mesh.face_count), ("face_materials", -1, len(materials))):
+        ends = {"face_groups": (0, len(groups) or mesh.face_count), "face_materials": (-1, len(materials))}
+        for name, (low, count) in ends.items():
             if name in row:
                 changes[name] = _unrun(row[name], mesh.face_count, low, count)
         for name in ("texcoord", "normal"):

@@ -78,7 +78,7 @@ def test_names_tree_and_materials(tmp_path: Path) -> None:
     assert scene.shape("Ball").materials == skin.materials
     document = scene.document
     assert isinstance(document, VrmlDocument)
-    assert any("Box is not a polygon mesh" in f.message for f in document.findings)
+    assert any("Box is not a polygon mesh" in remark for remark in document.remarks)
 
 
 def test_unchanged_scene_is_written_as_it_was(tmp_path: Path) -> None:
