@@ -41,9 +41,9 @@ CLOSED = ("PP",)
 
 EXPRESSION_POSES: dict[str, Units] = {
     "joy": {
-        "jawOpen": 0.12,
-        **_both("mouthSmile", 0.8),
-        **_both("mouthUpperUp", 0.25),
+        "jawOpen": 0.14,
+        **_both("mouthSmile", 0.95),
+        **_both("mouthUpperUp", 0.3),
         **_both("cheekSquint", 0.8),
         **_both("eyeSquint", 0.4),
     },
@@ -92,7 +92,6 @@ def high_level_motions(builder: MotionBuilder) -> list[FaceMotion]:
     ):
         for entry in entries:
             offsets = builder.over_eyeballs(builder.pose(poses[entry.name]))
-            if entry.name in CLOSED:
-                offsets = builder.with_closed_lips(offsets)
+            offsets = builder.with_lips_in_contact(offsets, gaps=entry.name in CLOSED)
             out.append(FaceMotion(table_name(fap_id, entry.id), fap_id, entry.id, BLEND_MAX, offsets))
     return out

@@ -109,11 +109,11 @@ class MotionBuilder:
             skin = Lid(self.head, side, "upper").over_eyeball(skin)
         return self._with_skin(offsets, skin)
 
-    def with_closed_lips(self, offsets: Offsets) -> Offsets:
-        """The offsets with whatever gap is left between the lips closed."""
+    def with_lips_in_contact(self, offsets: Offsets, gaps: bool) -> Offsets:
+        """The offsets with lips that do not run through each other, nor leave a gap if `gaps` are to be closed."""
         skin = offsets["skin"]
         for _ in range(PASSES):
-            skin = skin + close_lips(self.head, skin)
+            skin = skin + close_lips(self.head, skin, gaps)
         return self._with_skin(offsets, skin)
 
     @cached_property

@@ -76,13 +76,14 @@ def _move(head: Head, key: str, skin_offsets: Floats) -> Floats:
     return moved
 
 
-def close_lips(head: Head, motion: Floats | None = None) -> Floats:
-    """Offsets (n, 3) of the skin that bring both lips together.
+def close_lips(head: Head, motion: Floats | None = None, gaps: bool = True) -> Floats:
+    """Offsets (n, 3) of the skin that bring both lips into contact.
 
     Parameters
     ----------
-    motion : (n, 3) offsets of a pose whose lips shall meet half-way where a gap is left; None = the neutral face,
-        whose lips meet on a level line at the height of the corners.
+    motion : (n, 3) offsets of a pose, whose lips meet half-way; None = the neutral face, whose lips meet on a level
+        line at the height of the corners.
+    gaps : close gaps too; False only parts lips that run through each other.
     """
     p, fapu = head.positions, head.fapu
     skin = head.parts["skin"] if motion is None else head.parts["skin"] + motion
@@ -98,8 +99,8 @@ def close_lips(head: Head, motion: Floats | None = None) -> Floats:
     for name, edge in LIPS.items():
         side, line = sides[name], lines[name]
         shift = level + edge.sign * 0.5 * LIP_GAP * fapu.mns0 - line[:, 1]
-        if motion is not None:
-            shift = np.where(gap > LIP_GAP * fapu.mns0, shift, 0.0)
+        if not gaps:
+            shift = np.where(gap < LIP_GAP * fapu.mns0, shift, 0.0)
         x = skin[side, 0]
         place = np.column_stack([np.interp(x, span, line[:, k]) for k in (1, 2)])
         away = np.linalg.norm(skin[side, 1:] - place, axis=1) / (LIP_REACH * fapu.es0)

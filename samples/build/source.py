@@ -25,7 +25,7 @@ RACES = {"caucasian": 0.35, "asian": 0.35, "african": 0.3}
 SEXES = {"female": 0.6, "male": 0.4}
 LID_OPENING = 0.155
 """Of the eye separation: nearly MakeHuman's own; the iris is as wide."""
-THRUST = 100
+THRUST = 40
 """Border of the eyeball thrust, FAP 27 and 28."""
 
 
