@@ -11,6 +11,7 @@ from fba.arrays import Floats, Ints
 from fba.errors import MeshError
 from fba.findings import Finding
 from fba.mesh import Material, PolyMesh
+from fba.scene import Shape
 from formats.vrml97.tree import Booleans, Nodes, Numbers, Strings, Use, VrmlNode, node, number, numbers
 
 Definitions = Mapping[str, VrmlNode]
@@ -273,26 +274,30 @@ def shape_node(name: str, mesh: PolyMesh, materials: tuple[Material, ...]) -> Vr
     )
 
 
-def same_mesh(a: PolyMesh, b: PolyMesh) -> bool:
-    """Whether the points, polygons and texture coordinates are equal (normals follow from them)."""
+def same_polygons(a: PolyMesh, b: PolyMesh) -> bool:
+    """Whether two meshes have the same number of points, the same polygons and texture coordinates."""
 
     def same(x: Floats | Ints | None, y: Floats | Ints | None) -> bool:
         if x is None or y is None:
             return x is y
         return np.array_equal(x, y)
 
-    names = ("vertices", "indices", "offsets", "texcoords", "texcoord_indices")
-    return all(same(getattr(a, n), getattr(b, n)) for n in names)
+    names = ("indices", "offsets", "texcoords", "texcoord_indices")
+    return a.vertex_count == b.vertex_count and all(same(getattr(a, n), getattr(b, n)) for n in names)
+
+
+def same_mesh(a: PolyMesh, b: PolyMesh) -> bool:
+    """Whether points, polygons and texture coordinates are equal (normals follow from them)."""
+    return same_polygons(a, b) and np.array_equal(a.vertices, b.vertices)
 
 
 def carried_colors(
-    faces: VrmlNode, old: PolyMesh, new: PolyMesh, defs: Definitions
+    faces: VrmlNode, old: PolyMesh, new: PolyMesh, rows: Ints | None, defs: Definitions
 ) -> dict[str, Numbers | Nodes | Booleans]:
     """The Color fields of an IndexedFaceSet cut to a part of its mesh; empty if it has none or the part is not one."""
     owner = child(faces, "color", defs)
     palette = None if owner is None else values_of(owner, "color", 3)
     index = _integers(faces, "coordIndex")
-    rows = rows_of(new, old)
     if palette is None or index is None or rows is None:
         return {}
     own = _integers(faces, "colorIndex")
@@ -322,18 +327,19 @@ def carried_colors(
     }
 
 
-def changed_shape(
-    shape: VrmlNode, old: PolyMesh, new: PolyMesh, materials: tuple[Material, ...], defs: Definitions
-) -> VrmlNode:
-    """A Shape of the document with another mesh; its appearance and, where the polygons are the same, all else stay."""
+def changed_shape(shape: VrmlNode, old: PolyMesh, new: Shape, rows: Ints | None, defs: Definitions) -> VrmlNode:
+    """A Shape of the document with another mesh; its appearance and, where the polygons are the same, all else stay.
+
+    rows : for each vertex of the new mesh its place in the old one; None if it is not a part of it.
+    """
     faces = child(shape, "geometry", defs)
     assert faces is not None
-    if np.array_equal(old.indices, new.indices) and np.array_equal(old.offsets, new.offsets):
-        geometry = faces.with_field("coord", Nodes((node("Coordinate", point=numbers(new.vertices)),)))
+    if same_polygons(old, new.mesh):
+        geometry = faces.with_field("coord", Nodes((node("Coordinate", point=numbers(new.mesh.vertices)),)))
         geometry = geometry.with_field("normal", None).with_field("normalIndex", None)
     else:
-        geometry = face_set_node(new, materials, like=faces)
-        for name, value in carried_colors(faces, old, new, defs).items():
+        geometry = face_set_node(new.mesh, new.materials, like=faces)
+        for name, value in carried_colors(faces, old, new.mesh, rows, defs).items():
             geometry = geometry.with_field(name, value)
     return shape.with_field("geometry", Nodes((replace(geometry, def_name=None),)))
 

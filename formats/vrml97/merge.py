@@ -7,12 +7,13 @@ to its parts, which take over its appearance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from fba.arrays import Ints
 from fba.scene import FaceScene, Node, Shape, Transform
 from formats.vrml97.axes import in_file_axes
 from formats.vrml97.document import METADATA_DEF, VrmlDocument
@@ -56,6 +57,7 @@ class _Merger:
         self.names = {id(item): name for name, item in document.nodes.items()}
         outgoing = [n for n, _ in scene.walk()]
         self.alive = {id(known) for known in map(self.known, outgoing) if known is not None}
+        self.places = _file_places(document.parts)
         self.def_names: dict[str, str] = {}
         free = Names([*self.defs, METADATA_DEF])
         for part in outgoing:
@@ -136,7 +138,7 @@ class _Merger:
         assert isinstance(before, Shape)
         built = known
         if not same_mesh(part.mesh, before.mesh):
-            built = changed_shape(known, before.mesh, part.mesh, part.materials, self.defs)
+            built = changed_shape(known, before.mesh, part, self.rows(part, before), self.defs)
         if part.materials != before.materials:
             built = built.with_field("appearance", Nodes((appearance_node(part.materials),)))
         return built
@@ -144,10 +146,29 @@ class _Merger:
     def new_shape(self, part: Shape) -> VrmlNode:
         """A shape that the document does not know: a piece of one of its shapes, or altogether new."""
         for name, before in self.document.parts.items():
-            if not isinstance(before, Shape) or rows_of(part.mesh, before.mesh) is None:
-                continue
-            return changed_shape(self.document.nodes[name], before.mesh, part.mesh, part.materials, self.defs)
+            if isinstance(before, Shape) and (rows := self.rows(part, before)) is not None:
+                return changed_shape(self.document.nodes[name], before.mesh, part, rows, self.defs)
         return shape_node(self.def_names[part.name], part.mesh, part.materials)
+
+    def rows(self, part: Shape, whole: Shape) -> Ints | None:
+        """For each vertex of a shape its place in a shape of the document; None if it is not a part of that.
+
+        The vertices' places in the file tell, where they are noted; else equal coordinates do.
+        """
+        if part.vertex_ids is not None:
+            places = self.places[whole.name]
+            inverse = np.full(max(int(places.max(initial=-1)), int(part.vertex_ids.max(initial=-1))) + 1, -1, np.int32)
+            inverse[places] = np.arange(places.size)
+            found = inverse[part.vertex_ids]
+            if found.size and found.min() >= 0 and np.array_equal(whole.mesh.vertices[found], part.mesh.vertices):
+                return found
+        return rows_of(part.mesh, whole.mesh)
+
+
+def _file_places(parts: Mapping[str, Shape | Transform]) -> dict[str, Ints]:
+    """Name of each shape -> places of its vertices in the file's own vertex list."""
+    roots = tuple(p for p in parts.values() if isinstance(p, Shape))
+    return FaceScene(roots).file_order()
 
 
 def _surroundings(scene: FaceScene, roots: tuple[Node, ...]) -> list[VrmlNode]:

@@ -264,6 +264,50 @@ def test_colors_of_polygons_go_with_the_polygons(tmp_path: Path) -> None:
     assert not geometry.get("colorPerVertex").values[0]  # type: ignore[union-attr]
 
 
+def test_parts_with_coincident_vertices_take_their_own_colors(tmp_path: Path) -> None:
+    """Two triangles in the same place, told apart by the noted places of their vertices alone."""
+    colors = "Color { color [ 1 0 0, 0 1 0 ] }"
+    points = "Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 0 0, 1 0 0, 1 1 0 ] }"
+    fields = {"color": colors, "colorPerVertex": "FALSE", "coord": points, "coordIndex": "[ 0 1 2 -1 3 4 5 -1 ]"}
+    scene = read_scene(tmp_path, HEADER + "DEF A Shape { " + face_set(**fields) + " }")
+    mesh = scene.shapes[0].mesh
+    parts = []
+    for name, mask in (("back", np.arange(6) >= 3), ("front", np.arange(6) < 3)):
+        part, ids = mesh.submesh(mask)
+        parts.append(Shape(name, part, vertex_ids=ids))
+    write(replace(scene, roots=tuple(parts)), tmp_path / "out.wrl")
+    defs = definitions(parse((tmp_path / "out.wrl").read_text()))
+    found = [defs[n].nodes("geometry")[0].nodes("color")[0] for n in ("back", "front")]  # type: ignore[union-attr]
+    assert [c.get("color").values.tolist() for c in found] == [[0, 1, 0], [1, 0, 0]]  # type: ignore[union-attr]
+    back = read(tmp_path / "out.wrl")
+    assert isinstance(back, FaceScene)
+    assert np.array_equal(back.world_neutral(), scene.world_neutral())
+
+
+def test_new_texture_coordinates_are_written(tmp_path: Path) -> None:
+    uv = "TextureCoordinate { point [ 0 0, 1 0, 1 1, 0 1 ] }"
+    scene = read_scene(tmp_path, HEADER + "DEF A Shape { " + face_set(texCoord=uv) + " }")
+    shape = scene.shapes[0]
+    changed = replace(shape.mesh, texcoords=np.full((4, 2), 0.125))
+    write(replace(scene, roots=(replace(shape, mesh=changed),)), tmp_path / "out.wrl")
+    back = read(tmp_path / "out.wrl")
+    assert isinstance(back, FaceScene)
+    assert back.shapes[0].mesh.texcoords is not None
+    assert np.all(back.shapes[0].mesh.texcoords == 0.125)
+
+
+def test_moved_vertices_change_nothing_but_the_coordinates(tmp_path: Path) -> None:
+    scene = read_scene(tmp_path, FULL)
+    skin = scene.shape("Skin")
+    moved = skin.mesh.with_vertices(skin.mesh.vertices + 1.0)
+    out = definitions(parse(to_text(scene.map_shapes({"Skin": replace(skin, mesh=moved)}))))["Skin"].nodes("geometry")[
+        0
+    ]
+    before = definitions(parse(FULL))["Net"]
+    assert isinstance(out, VrmlNode)
+    assert out.with_field("coord", None) == replace(before, def_name=None).with_field("coord", None)
+
+
 def test_a_shape_that_is_gone_stays_where_it_was_used_again(tmp_path: Path) -> None:
     scene = read_scene(tmp_path, FULL)
     head = scene.roots[0]
