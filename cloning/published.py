@@ -4,7 +4,7 @@ Positions are divided by the FAPUs of the nearest feature point, projected to a 
 over the triangulated feature points; motion is interpolated from the source's triangles, the outermost one winning,
 averaged over a support of 0.02, with lip regions by polygons. Choices where the paper is silent: the feature points
 are triangulated by Delaunay (the published triangulation is a picture), and triangles across the seam at the back
-are left out.
+are repeated on both of its sides.
 """
 
 from __future__ import annotations
@@ -129,23 +129,42 @@ def _motion_matrix(mine: Projected, triangles: Ints, plane: Floats, lips: Ints) 
     from scipy.sparse import csr_array
 
     samples = np.concatenate([plane[:, None], circle_samples(plane)], axis=1)
-    count = samples.shape[1]
-    across = np.ptp(mine.plane[triangles][:, :, 0], axis=1) > np.pi
+    count, n = samples.shape[1], len(mine.plane)
+    points, tiles = _round_the_back(mine.plane, triangles)
+    depth = np.tile(mine.depth, 3)
     rows, columns, entries = [], [], []
     outside = 0
     for number in (0, 1, 2):
         here = np.flatnonzero(lips == number)
         opposite = {0: -1, 1: 2, 2: 1}[number]
-        kept = triangles[~across & ~np.any(mine.lips[triangles] == opposite, axis=1)]
+        kept = tiles[~np.any(mine.lips[tiles % n] == opposite, axis=1)]
         if not len(here) or not len(kept):
             continue
-        place = TriangleMesh2D(mine.plane, kept, mine.depth).locate(samples[here].reshape(-1, 2))
+        place = TriangleMesh2D(points, kept, depth).locate(samples[here].reshape(-1, 2))
         outside += int(np.sum(~place.inside))
         rows.append(np.repeat(here, 3 * count))
-        columns.append(kept[place.triangles].ravel())
+        columns.append(kept[place.triangles].ravel() % n)
         entries.append(place.weights.ravel() / count)
     matrix = csr_array(
         (np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))),
-        shape=(len(plane), len(mine.plane)),
+        shape=(len(plane), n),
     )
     return matrix, outside / max(samples.shape[0] * count, 1)
+
+
+def _round_the_back(plane: Floats, triangles: Ints) -> tuple[Floats, Ints]:
+    """Triangles that cross the seam at +-pi once at its left and once at its right.
+
+    Returns
+    -------
+    points : (3n, 2), the plane, and the plane one turn to the left and to the right.
+    triangles : (t', 3) into these points; modulo n they are the vertices.
+    """
+    n = len(plane)
+    turn = np.array([2.0 * np.pi, 0.0])
+    points = np.concatenate([plane, plane + turn, plane - turn])
+    across = np.ptp(plane[triangles][:, :, 0], axis=1) > np.pi
+    split = triangles[across]
+    left = split + np.where(plane[split][:, :, 0] < 0.0, n, 0)
+    right = split + np.where(plane[split][:, :, 0] > 0.0, 2 * n, 0)
+    return points, np.concatenate([triangles[~across], left, right])
