@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from fat.face import AnimatableFace
-from fba.errors import LandmarkError, UnknownFormatError
+from fba.errors import FbaError, LandmarkError, UnknownFormatError
 from fba.scene import FaceScene
 
 
@@ -82,7 +82,12 @@ def read(path: str | Path) -> FaceScene | AnimatableFace:
 
         path = default_source()
     path = Path(path)
-    return cast("FaceScene | AnimatableFace", _load(format_of(path), "read")(path))
+    try:
+        return cast("FaceScene | AnimatableFace", _load(format_of(path), "read")(path))
+    except FbaError as error:
+        if path.name not in str(error):
+            error.args = (f"{path}: {error}", *error.args[1:])
+        raise
 
 
 def read_scene(path: str | Path) -> FaceScene:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -113,9 +114,20 @@ class CheckResult:
         }
 
 
-def check_face(face: AnimatableFace, source: AnimatableFace | None = None) -> CheckResult:
+def check_file(path: Path) -> list[Finding]:
+    """What is wrong with the file itself; USD files go through OpenUSD's validators and our own."""
+    if path.suffix.lower() not in (".usd", ".usda", ".usdc"):
+        return []
+    from formats.usd.validate import validate_stage
+
+    return validate_stage(path)
+
+
+def check_face(
+    face: AnimatableFace, source: AnimatableFace | None = None, file_findings: Iterable[Finding] = ()
+) -> CheckResult:
     """Check a face; tables that cannot be played are reported, not measured."""
-    findings = tuple(validate(face))
+    findings = (*file_findings, *validate(face))
     if any(f.severity == "error" for f in findings):
         return CheckResult(findings, True, (), (), None)
     neutral = Player(face).pose().local

@@ -246,7 +246,8 @@ class TableReader:
         count = self.shapes[name].mesh.vertex_count
         if index.size and (index.min() < 0 or index.max() >= count):
             raise FaceDefTablesError(
-                f"line {entry.line}: coordIndex of the FaceDefMesh of '{name}' leaves 0..{count - 1}"
+                f"line {entry.line}: coordIndex of the FaceDefMesh of '{name}' runs from {index.min()} to "
+                f"{index.max()}, but the shape has {count} vertices"
             )
         slopes = values_of(entry, "displacements", 3)
         turned = self.scene.frame.from_file(np.zeros((0, 3)) if slopes is None else slopes)

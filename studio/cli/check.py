@@ -19,10 +19,10 @@ def check(
 ) -> None:
     """Check conformance and quality; ends with 1 when something fails."""
     from formats import read_face
-    from studio.checking import check_face
+    from studio.checking import check_face, check_file
     from studio.cli.console import console, print_findings, print_json, table
 
-    result = check_face(read_face(str(face)), None if source is None else read_face(source))
+    result = check_face(read_face(str(face)), None if source is None else read_face(source), check_file(face))
     if as_json:
         print_json({"file": str(face), **result.to_dict()})
     else:

@@ -15,7 +15,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from fat import AnimatableFace
+from fba import FapStream
 from formats import read, read_face, read_scene
+from formats.fap import write_fap
 from samples import sample
 from studio.cli.app import app
 from studio.cli.arguments import parse_faps
@@ -128,11 +130,8 @@ def test_play_draws(cloned: Path, tmp_path: Path) -> None:
     from PIL import Image
 
     short = tmp_path / "short.fap"
-    lines = sample("streams/demo.fap").read_text().splitlines()
-    header = next(i for i, line in enumerate(lines) if not line.startswith("#"))
-    words = lines[header].split()
-    lines[header] = " ".join([*words[:-1], "3"])
-    short.write_text("\n".join(lines[: header + 7]) + "\n")
+    jaw = [100, 300, 500]
+    write_fap(FapStream.build(25.0, 3, {3: jaw}), short)
     out = tmp_path / "short.gif"
     result = fba("play", cloned, short, "-o", out, "--size", "64")
     assert result.exit_code == 0, result.output
