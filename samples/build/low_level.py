@@ -15,14 +15,14 @@ class Border:
     units : ARKit unit -> relative weight; the whole is scaled until the FAP's own point moves by its value.
     masks : names of `Masks` whose product splits the mix; none = all of it, teeth and tongue included.
     axes : the only components that are kept, e.g. "x"; none = all.
-    most : largest scale of the units; what is missing then comes from the local kernel of the own point.
+    most : largest scale of the units; what is missing comes from sliding the masked skin along itself.
     """
 
     value: int
     units: Units
     masks: tuple[str, ...] = ()
     axes: str = ""
-    most: float = 4.0
+    most: float = 4.5
 
 
 @dataclass(frozen=True)
@@ -87,10 +87,10 @@ def _sided(k: int, side: str) -> list[Recipe]:
     raised = (Border(-300, {f"mouthFrown{side}": 1.0}, corner), Border(600, {f"mouthSmile{side}": 1.0}, corner))
     inner, outer = ("2.4", "2.5")[k], ("8.3", "8.4")[k]
     return [
-        Recipe(6 + k, stretch, (outer,), note=_TIED),
-        Recipe(53 + k, stretch, (inner,), note=_TIED),
-        Recipe(12 + k, raised, (outer,), note=_TIED),
-        Recipe(59 + k, raised, (inner,), note=_TIED),
+        Recipe(6 + k, stretch, (outer,), carried=CHEEKS, note=_TIED),
+        Recipe(53 + k, stretch, (inner,), carried=CHEEKS, note=_TIED),
+        Recipe(12 + k, raised, (outer,), carried=CHEEKS, note=_TIED),
+        Recipe(59 + k, raised, (inner,), carried=CHEEKS, note=_TIED),
         Recipe(
             19 + k,
             (Border(-350, {f"eyeWide{side}": 1.0}), Border(1024, {f"eyeBlink{side}": 1.0})),
@@ -98,7 +98,7 @@ def _sided(k: int, side: str) -> list[Recipe]:
             lid=(half, "upper"),
         ),
         Recipe(21 + k, (Border(512, {f"eyeSquint{side}": 1.0}),), carried=LIDS, lid=(half, "lower")),
-        Recipe(37 + k, (Border(100, {f"browDown{side}": 1.0}, axes="x"),), carried=LIDS),
+        Recipe(37 + k, (Border(100, {f"browDown{side}": 1.0}, (f"beside_{half}",), axes="x"),), carried=LIDS),
         Recipe(41 + k, (Border(140, {f"cheekSquint{side}": 1.0}),), carried=LIDS),
     ]
 
@@ -112,7 +112,7 @@ RECIPES: tuple[Recipe, ...] = tuple(
             *_lips(),
             *_sided(0, "Left"),
             *_sided(1, "Right"),
-            *(Recipe(fap, (Border(value, _BROW_UP, (key,)),)) for fap, key, value in _BROW),
+            *(Recipe(fap, (Border(value, _BROW_UP, (key,), most=0.25),)) for fap, key, value in _BROW),
         ],
         key=lambda r: r.fap,
     )

@@ -38,10 +38,11 @@ BROWS = {"left": ("4.1", "4.3", "4.5"), "right": ("4.2", "4.4", "4.6")}
 class Masks:
     """Weights (n,) in 0..1 by name.
 
-    ``left`` ``right``: halves. ``mouth``: between the corners. ``upper`` ``lower``: lips.
+    ``left`` ``right``: halves. ``beside_left`` ``beside_right``: the same from the inner end of the brow outwards.
+    ``mouth``: between the corners. ``upper`` ``lower``: lips.
     ``corner_left`` ``corner_right``: beyond the quarter point of the mouth.
     ``2.8`` ...: the share of one contour point in its lip; all shares and the corners add up to 1 on the lip.
-    ``4.3`` ...: the share of one eyebrow point in the brow above the lid's fold.
+    ``4.3`` ...: the share of one eyebrow point in the forehead between the lid's fold and the hair line.
     """
 
     head: Head
@@ -53,6 +54,8 @@ class Masks:
             return self._lips[name]
         if name.startswith("corner_"):
             return self._corner(name.removeprefix("corner_"))
+        if name.startswith("beside_"):
+            return self._beside(name.removeprefix("beside_"))
         if name == "mouth":
             return self._mouth()
         if name.startswith("4."):
@@ -85,6 +88,10 @@ class Masks:
         sign = 1.0 if side == "left" else -1.0
         quarter, corner = abs(p["2.6"][0]), abs(p["2.4"][0])
         return smoothstep((sign * self._skin[:, 0] - quarter) / (corner - quarter))
+
+    def _beside(self, side: str) -> Floats:
+        brow = self.head.positions["4.1" if side == "left" else "4.2"][0]
+        return smoothstep(self._skin[:, 0] / brow)
 
     def _contour(self, key: str) -> Floats:
         lip, row, place = next(
@@ -153,14 +160,20 @@ class Masks:
         keys = BROWS[side]
         x = sign * self._skin[:, 0]
         knots = [sign * p[k][0] for k in keys]
-        first, last = -knots[0], knots[-1] + (knots[-1] - knots[-2])
+        first, last = -knots[0], knots[-1] + 1.6 * (knots[-1] - knots[-2])
         along = _hat(x, [first, *knots, last], keys.index(key) + 1)
         fold = p["3.13" if side == "left" else "3.14"][1]
         brow = np.interp(x, knots, [p[k][1] for k in keys])
-        share: Floats = along * smoothstep((self._skin[:, 1] - fold) / (brow - fold))
+        hair = np.interp(x, [0.0, p["11.3"][0]], [p["11.1"][1], p["11.3"][1]])
+        y = self._skin[:, 1]
+        rise = smoothstep((y - fold) / (brow - fold))
+        fade = smoothstep(((y - brow) / (hair - brow) - BROW_HEIGHT) / (1.0 - BROW_HEIGHT))
+        share: Floats = along * rise * (1.0 - fade)
         return share
 
 
+BROW_HEIGHT = 0.3
+"""Up to this share of the way from the points of the brow to the hair line, the brow moves as a whole."""
 ENDS = (("2.5", "2.4"), ("8.4", "8.3"))
 
 

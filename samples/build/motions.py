@@ -80,6 +80,9 @@ class MotionBuilder:
         moves = float(self.correction.at(own, raw["skin"]) @ direction)
         scale = min(float(wanted @ direction) / moves, border.most)
         raw = {name: scale * offsets for name, offsets in raw.items()}
+        missing = float(wanted @ direction) - scale * moves
+        if scale == border.most and border.masks:
+            raw["skin"] = raw["skin"] + missing * self._sliding(direction, border.masks, own)
         axis = int(np.argmax(np.abs(direction)))
         goals: dict[PointAxis, float] = {(key, axis): float(wanted[axis]) for key in (own, *recipe.tied)}
         free = {(key, a) for key in recipe.carried for a in range(3)} - goals.keys()
@@ -126,6 +129,16 @@ class MotionBuilder:
         lift = np.array([0.0, TIP_LIFT, -0.5 * TIP_LIFT]) * self.head.fapu.es0
         return {"tongue": share[:, None] * lift}
 
+    def _sliding(self, direction: Floats, names: Sequence[str], own: str) -> Floats:
+        """The masked skin sliding along its own surface: as far as 1 along a direction at the own point."""
+        normals = self.head.scene.shape("skin").mesh.vertex_normals()
+        across = normals @ direction
+        tangent = direction - across[:, None] * normals
+        tangent /= np.maximum(1.0 - across**2, STEEPEST)[:, None]
+        slide = np.prod([self.masks[name] for name in names], axis=0)[:, None] * tangent
+        even: Floats = slide / float(self.correction.at(own, slide) @ direction)
+        return even
+
     def _masked(self, offsets: Offsets, names: Sequence[str]) -> Offsets:
         """Only the skin's share under the product of these masks; everything, if there are none."""
         if not names:
@@ -144,6 +157,8 @@ TIP_LIFT = 0.2
 """Height of the tongue's tip in that unit, in ES0."""
 LID_STEP = 256
 """Between the borders of a closing lid: the chord of each step stays within 0.4 % of the eyeball's radius."""
+STEEPEST = 0.4
+"""Squared cosine between a direction and the surface below which skin no longer slides the whole way."""
 NOISE = 3e-4
 """Offsets below this length (ES0) are what is left of a local correction far away; they become 0."""
 

@@ -100,13 +100,15 @@ def test_own_point_moves_its_amount(key: tuple[int, int, int]) -> None:
 
 @pytest.mark.parametrize("key", [k for k in low_level() if k[0] not in (3, 14, 15)])
 def test_other_points_stay(key: tuple[int, int, int]) -> None:
-    """Cross-talk below 5 % of the own motion, but for the tied corners and what PROVENANCE.md names."""
+    """Cross-talk below 5 %; but tied corners take each other and the cheek along, a cheek the lid above it."""
     own = abs(key[2]) * source().fapu.unit(fap(key[0]).unit)
     for number in range(3, 69):
         other = fap(number)
         if other.direction is None or number in (key[0], TIED.get(key[0])) or other.feature_points[0][:2] == "6.":
             continue
         if key[0] in (19, 20, 41, 42) and number in (21, 22):
+            continue
+        if key[0] in TIED and number in (39, 40):
             continue
         along = float(moved(motions()[key], other.feature_points[0]) @ np.asarray(other.direction))
         assert abs(along) <= 0.05 * own, other.name
