@@ -72,13 +72,12 @@ def test_a_file_cut_short_is_refused_or_read_without_the_rest(entry: Format, ext
     cut = tmp_path / f"cut{extension}"
     for part in (0.1, 0.5, 0.9, 0.999):
         cut.write_bytes(data[: int(len(data) * part)])
+        refused = ""
         try:
-            found = read(cut)
+            read(cut)
         except FbaError as error:
-            assert "cut" in str(error)
-        else:
-            assert extension in (".obj", ".off", ".ply"), "a cut file was taken for whole"
-            assert found is not None
+            refused = str(error)
+        assert "cut" in refused or extension in (".obj", ".off", ".ply"), "a cut file was taken for whole"
 
 
 @pytest.mark.parametrize(("entry", "extension"), READERS, ids=named(READERS))
