@@ -25,9 +25,9 @@ POINTS_FILE = Path(__file__).with_name("makehuman_points.json")
 EYES = (("eye_left", Role.EYE_LEFT, "helper-l-eye", "3.5"), ("eye_right", Role.EYE_RIGHT, "helper-r-eye", "3.6"))
 
 _SKIN = (
-    Material("skin", (0.80, 0.60, 0.50), specular=(0.06, 0.06, 0.06), shininess=0.2),
-    Material("lip", (0.71, 0.42, 0.38), specular=(0.06, 0.06, 0.06), shininess=0.2),
-    Material("mouth", (0.45, 0.18, 0.17), specular=(0.06, 0.06, 0.06), shininess=0.2),
+    Material("skin", (0.87, 0.69, 0.59), specular=(0.06, 0.06, 0.06), shininess=0.2),
+    Material("lip", (0.80, 0.54, 0.49), specular=(0.06, 0.06, 0.06), shininess=0.2),
+    Material("mouth", (0.50, 0.22, 0.21), specular=(0.06, 0.06, 0.06), shininess=0.2),
 )
 _LASH = Material("lash", (0.16, 0.11, 0.09))
 _TOOTH = Material("tooth", (0.92, 0.89, 0.80), specular=(0.3, 0.3, 0.3), shininess=0.6)

@@ -77,11 +77,14 @@ class KnownHead:
 
 
 def phenotype_a(makehuman: MakeHuman) -> Head:
-    """African male with a square head, a wide nose and a wide mouth."""
-    mixture = macro("african", "male", "young", 1.0)
+    """African, between male and female, with a square head, a wide nose and a wide mouth.
+
+    The male targets alone let the lids hang half over the pupil, far from the neutral pose.
+    """
+    mixture = macro("african", "male", "young", 0.45) | macro("african", "female", "young", 0.55)
     mixture |= {("head_targets", "head-square"): 1.0, ("nose_targets", "nose-scale-horiz-incr"): 0.7}
     head = build_head(makehuman, mixture, "phenotype_a")
-    return neutral(_scaled(head, "8.1", (1.08, 1.0, 1.0), 0.45), 0.165)
+    return neutral(_scaled(head, "8.1", (1.08, 1.0, 1.0), 0.45), 0.16)
 
 
 def phenotype_b(makehuman: MakeHuman) -> Head:
