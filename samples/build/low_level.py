@@ -22,7 +22,7 @@ class Border:
     units: Units
     masks: tuple[str, ...] = ()
     axes: str = ""
-    most: float = 4.5
+    most: float = 4.0
 
 
 @dataclass(frozen=True)
