@@ -69,8 +69,8 @@ def shape_colors(shape: Shape) -> Floats:
     if mesh.face_materials is not None and shape.materials:
         table = np.array([*(material_color(m, shape) for m in shape.materials), natural_color(shape.role, shape.name)])
         ids = np.where(mesh.face_materials >= 0, mesh.face_materials, len(shape.materials))
-        used = np.unique(ids)
-        return table[used[0]] if used.size == 1 else table[ids][mesh.triangle_faces]
+        used = np.unique(table[ids], axis=0)
+        return used[0] if len(used) == 1 else table[ids][mesh.triangle_faces]
     if mesh.face_groups is not None and mesh.group_names and shape.role in NAMED:
         table = np.array([natural_color(shape.role, name) for name in mesh.group_names])
         ids = np.clip(mesh.face_groups, 0, len(table) - 1)
