@@ -29,6 +29,10 @@ class SkinTransfer(Protocol):
         """(n_source, K, 3) offsets to (n_target, K, 3), mesh units of each face."""
         ...
 
+    def carry(self, values: Floats) -> Floats:
+        """(n_source, m) values of any field of the skin to (n_target, m), unscaled."""
+        ...
+
 
 Builder = Callable[[PreparedFace, PreparedFace, bool], SkinTransfer]
 

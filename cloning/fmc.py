@@ -36,6 +36,9 @@ class AlignedTransfer:
     def apply(self, motions: Floats) -> Floats:
         return self.skin_map.apply(motions)
 
+    def carry(self, values: Floats) -> Floats:
+        return self.skin_map.carry(values)
+
 
 def build_transfer(source: PreparedFace, target: PreparedFace, as_published: bool) -> SkinTransfer:
     """Prepare Facial Motion Cloning between two faces."""

@@ -64,6 +64,10 @@ class PublishedTransfer:
         result: Floats = carried.reshape(-1, motions.shape[1], 3) * self.target_scale[:, None, :]
         return result
 
+    def carry(self, values: Floats) -> Floats:
+        carried: Floats = self.matrix @ values
+        return carried
+
 
 def build_published(source: PreparedFace, target: PreparedFace) -> PublishedTransfer:
     """Prepare the published method between two faces."""

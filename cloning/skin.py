@@ -56,13 +56,18 @@ class SkinMap:
     def apply(self, motions: Floats) -> Floats:
         """Carry K motions at once: (n_s, K, 3) source offsets to (n_t, K, 3) target offsets, mesh units."""
         count = motions.shape[1]
-        flat = np.ascontiguousarray(motions.reshape(len(motions), -1))
+        carried = self.carry(motions.reshape(len(motions), -1)).reshape(-1, count, 3)
+        carried *= self.scale[:, None, :]
+        return carried
+
+    def carry(self, values: Floats) -> Floats:
+        """Carry any field, unscaled: (n_s, m) to (n_t, m)."""
+        fine = np.ascontiguousarray(values)
         for step in self.refinements:
-            flat = step.apply(flat)
-        carried: Floats = self.matrix @ flat
-        carried.reshape(-1, count, 3)[...] *= self.scale[:, None, :]
+            fine = step.apply(fine)
+        carried: Floats = self.matrix @ fine
         self.fill.apply(carried)
-        return carried.reshape(-1, count, 3)
+        return carried
 
 
 def build_skin_map(

@@ -12,6 +12,7 @@ from cloning.backends import SkinTransfer
 from cloning.bind import Binding
 from cloning.bodies import Body, Mover, body, eye_mover, teeth_mover, tongue_mover
 from cloning.correct import Correction, correction
+from cloning.eyeballs import EyeGuard, eye_guard
 from cloning.normalize import ratios
 from cloning.prepare import PreparedFace
 from fba.arrays import Floats
@@ -56,6 +57,7 @@ class FaceTransfer:
     ids : the feature points that are measured (and corrected).
     bodies : (source's body, target's body, mover) of each part that both faces have.
     bindings : shape name -> how it rides on the skin.
+    guard : keeps the skin off the eyeballs; None in published mode.
     """
 
     source: PreparedFace
@@ -65,6 +67,7 @@ class FaceTransfer:
     ids: tuple[str, ...]
     bodies: Sequence[tuple[Body, Body, Callable[[dict[str, Floats]], Mover]]]
     bindings: Mapping[str, Binding]
+    guard: EyeGuard | None = None
     findings: tuple[Finding, ...] = ()
     tally: Tally = field(default_factory=Tally)
 
@@ -86,6 +89,8 @@ class FaceTransfer:
         moving = np.stack([self.source.skin.join(m) for m in motions], axis=1)
         skin = self.skin.apply(moving)
         self._correct(moving, skin)
+        if self.guard is not None:
+            self.guard.apply(moving, skin)
         done: dict[str, Floats] = dict(self.target.skin.split(skin))
         for mine, yours, mover in self.bodies:
             offsets = mine.join(motions)
@@ -144,6 +149,7 @@ def build_face_transfer(
         ids,
         bodies,
         bindings,
+        None if as_published else eye_guard(source, target, skin.carry),
         tuple(findings),
     )
 
