@@ -125,12 +125,22 @@ class PolyMesh:
         return frozen(self.indices[self.triangle_corners], np.int32)
 
     @cached_property
-    def edges(self) -> Ints:
-        """Undirected polygon edges, each once, (e, 2) with ``a < b``, sorted."""
+    def _edges(self) -> tuple[Ints, Ints]:
         following = np.arange(self.indices.size) + 1
         following[self.offsets[1:] - 1] = self.offsets[:-1]
         pairs = np.sort(np.stack([self.indices, self.indices[following]], axis=1), axis=1)
-        return frozen(np.unique(pairs, axis=0), np.int32, (-1, 2))
+        edges, uses = np.unique(pairs, axis=0, return_counts=True)
+        return frozen(edges, np.int32, (-1, 2)), frozen(uses, np.int32)
+
+    @property
+    def edges(self) -> Ints:
+        """Undirected polygon edges, each once, (e, 2) with ``a < b``, sorted."""
+        return self._edges[0]
+
+    @property
+    def edge_uses(self) -> Ints:
+        """How many polygons use each edge, (e,): 1 on a border, 2 inside, more where it is not a manifold."""
+        return self._edges[1]
 
     @cached_property
     def used_vertices(self) -> Bools:

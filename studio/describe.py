@@ -23,10 +23,7 @@ from fba.stream import FapStream
 def describe_mesh(mesh: PolyMesh) -> dict[str, object]:
     """Counts of one mesh: vertices, polygons by arity, components, border and non-manifold edges, box."""
     arities = mesh.arities
-    following = np.arange(mesh.indices.size) + 1
-    following[mesh.offsets[1:] - 1] = mesh.offsets[:-1]
-    pairs = np.sort(np.stack([mesh.indices, mesh.indices[following]], axis=1), axis=1)
-    _, uses = np.unique(pairs, axis=0, return_counts=True)
+    uses = mesh.edge_uses
     used = mesh.used_vertices
     box = mesh.vertices[used] if used.any() else mesh.vertices
     return {
@@ -140,11 +137,7 @@ def mesh_findings(scene: FaceScene) -> list[Finding]:
 
 
 def _coincident_border_vertices(mesh: PolyMesh) -> int:
-    following = np.arange(mesh.indices.size) + 1
-    following[mesh.offsets[1:] - 1] = mesh.offsets[:-1]
-    pairs = np.sort(np.stack([mesh.indices, mesh.indices[following]], axis=1), axis=1)
-    edges, uses = np.unique(pairs, axis=0, return_counts=True)
-    border = np.unique(edges[uses == 1])
+    border = np.unique(mesh.edges[mesh.edge_uses == 1])
     if border.size == 0:
         return 0
     _, counts = np.unique(mesh.vertices[border], axis=0, return_counts=True)

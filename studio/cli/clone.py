@@ -116,6 +116,7 @@ def _clone_shapes(
     from fba.errors import LandmarkError
     from formats import read
     from formats.shapes import read_shapes, write_shapes
+    from formats.usd import write_shape_set
     from studio.cli.console import console, print_findings, progress
     from studio.inputs import points_of, scene_of
 
@@ -137,7 +138,10 @@ def _clone_shapes(
             as_published=as_published,
             progress=tell,
         )
-        write_shapes(made, scene, output)
+        if output.suffix.lower() in (".usd", ".usda", ".usdc"):
+            write_shape_set(scene, made, output)
+        else:
+            write_shapes(made, scene, output)
         if report is not None:
             _write_report(about, report)
     out = console()

@@ -45,6 +45,7 @@ def test_cube() -> None:
     assert abs(volume(cube)) == pytest.approx(1.0)
     assert volume(cube.reversed()) == pytest.approx(-volume(cube))
     assert len(cube.edges) == 12
+    assert set(cube.edge_uses) == {2}
     assert np.unique(cube.components()).size == 1
     outward = cube.vertices - 0.5
     sign = np.sign(volume(cube))

@@ -18,6 +18,8 @@ from fat import AnimatableFace
 from fba import FapStream
 from formats import read, read_face, read_scene
 from formats.fap import write_fap
+from formats.shapes import read_shapes
+from formats.usd import read_shape_set
 from samples import sample
 from studio.cli.app import app
 from studio.cli.arguments import parse_faps
@@ -163,22 +165,30 @@ def test_doctor_finds_the_shipped_face() -> None:
     assert {c["name"]: c["ok"] for c in document["checks"]}["shipped source face"]
 
 
-def test_free_shapes(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["out.npz", "out", "out.usda"])
+def test_free_shapes(tmp_path: Path, name: str) -> None:
     head = read_scene(sample("faces/tri_head.obj"))
     neutral = head.world_neutral()
     up = np.zeros((1, *neutral.shape))
-    up[0, :, 1] = 0.01 * np.exp(-(((neutral - neutral[neutral[:, 2].argmax()]) / 0.3) ** 2).sum(axis=1))
+    nose = neutral[neutral[:, 2].argmax()]
+    up[0, :, 1] = np.exp(-(((neutral - nose) / 2.0) ** 2).sum(axis=1))
+    up[np.abs(up) < 1e-3] = 0.0
     np.savez(tmp_path / "in.npz", names=np.array(["nose lift"]), deltas=up, neutral=neutral)
-    out = tmp_path / "out.npz"
+    out = tmp_path / name
     result = fba(
-        *("clone", sample("faces/quad_head.obj"), "-o", out),
+        *("clone", sample("faces/closed_head.obj"), "-o", out),
         *("--source", sample("faces/tri_head.obj"), "--shapes", tmp_path / "in.npz"),
     )
     assert result.exit_code == 0, result.output
-    with np.load(out) as made:
-        assert made["names"].tolist() == ["nose lift"]
-        assert made["neutral"].shape == made["deltas"].shape[1:]
-        assert np.abs(made["deltas"]).max() > 0.001
+    target = read_scene(sample("faces/closed_head.obj"))
+    made = read_shape_set(out) if name.endswith(".usda") else read_shapes(out, target)
+    assert made is not None
+    assert list(made.names) == ["nose lift"]
+    np.testing.assert_array_equal(made.neutral, target.world_neutral())
+    lifted = np.linalg.norm(made.deltas[0], axis=1)
+    nose = target.world_neutral()[:, 2].argmax()
+    assert lifted[nose] > 0.8 * lifted.max()
+    assert (lifted == 0).mean() > 0.5
 
 
 # Bad input: one clear message, exit code 3, and nothing lost.
