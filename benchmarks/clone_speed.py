@@ -1,6 +1,6 @@
 """How fast Facial Motion Cloning is, stage by stage, on targets of about 5,000 and 20,000 vertices.
 
-    python benchmarks/clone_speed.py [--json FILE]
+    python -m benchmarks.clone_speed [--json FILE]
 
 The targets are the shipped source's head with other proportions, once as it is and once with its skin subdivided.
 """

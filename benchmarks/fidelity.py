@@ -1,6 +1,6 @@
 """How faithful Facial Motion Cloning is: measures on faces whose motion is known, and on one whose is not.
 
-    python benchmarks/fidelity.py [--makehuman FOLDER] [--faces FOLDER] [--sheets FOLDER] [--json FILE]
+    python -m benchmarks.fidelity [--makehuman FOLDER] [--faces FOLDER] [--sheets FOLDER] [--json FILE]
 
 MakeHuman's source head is cloned onto two other phenotypes, decimated to another topology, where its own units are
 the truth, and onto ICT-FaceKit, where no truth exists. The default mode stands beside the published one.
@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from cloning import CloneReport, clone_shapes
-from cloning.labels import visible
 from cloning.prepare import PreparedFace, prepare
+from cloning.visibility import visible
 from fba.arrays import Floats
 from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.scene import FaceScene

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import TypeVar
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from fba.shapes import ShapeSet
 
 Progress = Callable[[str, float], None]
 Key = tuple[int, int]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +40,7 @@ class _Stages:
     progress: Progress | None
     timings: dict[str, float]
 
-    def run(self, name: str, work: Callable[[], object]) -> object:
+    def run(self, name: str, work: Callable[[], T]) -> T:
         if self.progress is not None:
             self.progress(name, 0.0)
         start = perf_counter()
@@ -119,7 +121,7 @@ def clone_with_report(
     face = AnimatableFace(
         rigged,
         yours.points,
-        tables,  # type: ignore[arg-type]
+        tables,
         yours.fapu,
         {**source.notes, "backend": way.name + (" as published" if as_published else ""), "source": source.scene.name},
     )
@@ -187,11 +189,8 @@ def _build(
 ) -> tuple[PreparedFace, PreparedFace, FaceTransfer]:
     mine = stages.run("source", lambda: prepare(source, source_points, "source"))
     yours = stages.run("target", lambda: prepare(target, target_points, "target"))
-    assert isinstance(mine, PreparedFace)
-    assert isinstance(yours, PreparedFace)
     skin = stages.run("correspondence", lambda: find_backend(backend).build(mine, yours, as_published))
-    transfer = stages.run("parts", lambda: build_face_transfer(mine, yours, skin, as_published))  # type: ignore[arg-type]
-    assert isinstance(transfer, FaceTransfer)
+    transfer = stages.run("parts", lambda: build_face_transfer(mine, yours, skin, as_published))
     return mine, yours, transfer
 
 
@@ -278,6 +277,6 @@ def _report(
         count,
         {**transfer.skin.measures, **transfer.tally.measures()},
         dict(transfer.skin.parameters),
-        (*about_source, *target.findings, *transfer.findings, *said),
+        (*about_source, *target.findings, *transfer.findings, *transfer.inexact(), *said),
         dict(stages.timings),
     )

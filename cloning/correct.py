@@ -34,6 +34,9 @@ SOFT = 0.05
 EXACT = 1e-8
 """Regularization of the narrow bumps."""
 
+STEEPEST = 12.0
+"""No bump is higher than this times the largest error that it mends."""
+
 TRUSTED = 0.3
 """Feature points on skin that is less active than this count less and less: nearly nothing moves there."""
 
@@ -89,8 +92,7 @@ class Correction:
             rows = np.clip(at_points @ here / TRUSTED, 0.0, 1.0)[:, None]
             system = rows * (at_points @ (here[:, None] * at_support))
             normal = system.T @ system
-            normal[np.diag_indices(k)] += ridge * max(float(np.trace(normal)) / k, 1e-30)
-            heights[:, m] = np.linalg.solve(normal, system.T @ (rows * missing[:, m]))
+            heights[:, m] = _solve(normal, system.T @ (rows * missing[:, m]), ridge, np.abs(missing[:, m]).max())
         added = (bumps @ heights.reshape(k, -1)).reshape(motion.shape)
         added *= active[:, :, None]
         motion += added
@@ -107,6 +109,18 @@ class Correction:
             rows, height = column.coords[0], column.data
             active[rows] = np.maximum(active[rows], height[:, None] * wanted[point])
         return active
+
+
+def _solve(normal: Floats, right: Floats, ridge: float, size: float) -> Floats:
+    """Heights of the bumps; smoother ones where feature points contradict each other on a coarse mesh."""
+    mean = max(float(np.trace(normal)) / len(normal), 1e-30)
+    while True:
+        system = normal.copy()
+        system[np.diag_indices(len(system))] += ridge * mean
+        heights = np.asarray(np.linalg.solve(system, right), dtype=np.float64)
+        if ridge >= 1.0 or np.abs(heights).max(initial=0.0) <= STEEPEST * size:
+            return heights
+        ridge *= 10.0
 
 
 def _smooth_step(t: Floats) -> Floats:

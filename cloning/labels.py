@@ -54,10 +54,6 @@ class Labels:
     sealed: tuple[int, ...]
     seam: Floats
 
-    def of_triangles(self, triangles: Ints) -> Ints:
-        """(t, 3) labels of the triangles' corners."""
-        return self.values[triangles]
-
 
 def label(surface: Surface) -> Labels:
     """Label the lips and lids of a skin."""
@@ -112,55 +108,3 @@ def _cut(surface: Surface, width: float) -> tuple[Bools, Floats]:
             step = int(before[step])
     away = dijkstra(surface.graph, indices=np.flatnonzero(on_path), min_only=True, limit=width)
     return on_path, away
-
-
-def visible(surface: Surface, directions: int = 14, cells: int = 384) -> Bools:
-    """Vertices that can be seen from somewhere outside, (n,) bool.
-
-    The surface is drawn into a depth buffer from directions all around (not from below); a vertex is visible
-    where it lies at the front of one of them and faces it.
-    """
-    seen = np.zeros(surface.vertex_count, dtype=bool)
-    normals = surface.normals
-    for view in _views(directions):
-        side = np.cross([0.0, 1.0, 0.0], view)
-        side /= np.linalg.norm(side)
-        up = np.cross(view, side)
-        flat = surface.vertices @ np.stack([side, up], axis=1)
-        depth = surface.vertices @ view
-        front = _front(flat, depth, surface.triangles, cells)
-        seen |= (depth > front) & (normals @ view > 0.05)
-    return seen
-
-
-def _views(count: int) -> Floats:
-    """Directions spread evenly over the sphere above a shallow angle, symmetric to the left and right."""
-    rows = [(0.0, 0.0), (0.0, -0.35), (0.0, 0.6)]
-    for angle in (0.5, 1.0, 1.6, 2.4):
-        rows += [(s * angle, e) for s in (1.0, -1.0) for e in (0.1, -0.3)]
-    rows += [(np.pi, 0.2), (0.0, 1.3)]
-    turned = np.array(rows[: max(count, 1)])
-    a, e = turned[:, 0], turned[:, 1]
-    found: Floats = np.stack([np.sin(a) * np.cos(e), np.sin(e), np.cos(a) * np.cos(e)], axis=1)
-    return found
-
-
-def _front(flat: Floats, depth: Floats, triangles: Ints, cells: int) -> Floats:
-    """Depth just behind the foremost surface at each vertex: a depth buffer of sample points of the triangles."""
-    low = flat.min(axis=0)
-    size = float((flat.max(axis=0) - low).max()) / cells
-    buffer = np.full((cells + 2, cells + 2), -np.inf)
-    corners = flat[triangles]
-    spread = np.linalg.norm(corners.max(axis=1) - corners.min(axis=1), axis=1)
-    steps = np.clip(np.ceil(spread / size).astype(int), 1, 24)
-    for n in np.unique(steps):
-        some = triangles[steps == n]
-        grid = [(i / n, j / n, 1.0 - (i + j) / n) for i in range(n + 1) for j in range(n + 1 - i)]
-        weights = np.array(grid)
-        places = np.einsum("gk,tkc->tgc", weights, flat[some]).reshape(-1, 2)
-        heights = np.einsum("gk,tk->tg", weights, depth[some]).ravel()
-        cell = ((places - low) / size).astype(int)
-        np.maximum.at(buffer, (cell[:, 0], cell[:, 1]), heights)
-    cell = ((flat - low) / size).astype(int)
-    found: Floats = buffer[cell[:, 0], cell[:, 1]] - 3.0 * size
-    return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from cloning.spheres import fit_sphere
 from cloning.surface import seam_links
-from fba.arrays import Bools, Floats, Ints
+from fba.arrays import Floats, Ints
 from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.findings import Finding
 from fba.scene import FaceScene, Node, Role, Shape, Transform
@@ -269,13 +269,3 @@ def _free(name: str, taken: set[str]) -> str:
         free, number = f"{name}_{number}", number + 1
     taken.add(free)
     return free
-
-
-def part_vertices(scene: FaceScene, role: Role) -> Floats:
-    """World vertices of all shapes of a role, joined, (n, 3)."""
-    found = [scene.world_vertices(s.name)[_used(s)] for s in scene.with_role(role)]
-    return np.concatenate(found) if found else np.zeros((0, 3))
-
-
-def _used(shape: Shape) -> Bools:
-    return shape.mesh.used_vertices

@@ -22,6 +22,9 @@ from fba.scene import Role
 CHUNK = 24
 """Motions carried in one go; keeps the memory of a fine source below a few hundred MB."""
 
+MISSED = 0.01
+"""An error of a feature point worth telling, in eye separations."""
+
 INNER_LIPS = ("2.2", "2.3", "2.6", "2.7", "2.8", "2.9")
 
 Offsets = Mapping[str, Floats]
@@ -34,14 +37,14 @@ class Tally:
     before: float = 0.0
     after: float = 0.0
     wanted: float = 0.0
-    worst: float = 0.0
+    worst: dict[str, float] = field(default_factory=dict)
 
     def measures(self) -> dict[str, float]:
         total = max(self.wanted, 1e-300)
         return {
             "fp_error_before": self.before / total,
             "fp_error_after": self.after / total,
-            "fp_error_worst_es": self.worst,
+            "fp_error_worst_es": max(self.worst.values(), default=0.0),
         }
 
 
@@ -85,6 +88,17 @@ class FaceTransfer:
                 tick(min(start + CHUNK, len(motions)) / len(motions))
         return out
 
+    def inexact(self) -> list[Finding]:
+        """Say which feature points could not be made exact, after `apply`."""
+        names = [key for key, missed in self.tally.worst.items() if missed > MISSED]
+        if self.correction is None or not names:
+            return []
+        text = (
+            f"feature points {', '.join(names)} miss their motion by up to {max(self.tally.worst.values()):.2f} eye "
+            "separations: on this coarse mesh they share triangles with others that move differently"
+        )
+        return [Finding("warning", "inexact-points", text, self.target.scene.name)]
+
     def _chunk(self, motions: Sequence[Offsets]) -> list[dict[str, Floats]]:
         moving = np.stack([self.source.skin.join(m) for m in motions], axis=1)
         skin = self.skin.apply(moving)
@@ -119,7 +133,8 @@ class FaceTransfer:
         self.tally.before += float(np.abs(before).sum())
         self.tally.after += float(np.abs(after).sum())
         self.tally.wanted += float(np.abs(wanted).sum())
-        self.tally.worst = max(self.tally.worst, float(np.abs(after).max(initial=0.0)) / self.target.fapu.es0)
+        for key, missed in zip(self.ids, np.abs(after).max(axis=(1, 2)) / self.target.fapu.es0, strict=True):
+            self.tally.worst[key] = max(self.tally.worst.get(key, 0.0), float(missed))
 
 
 def build_face_transfer(

@@ -12,8 +12,9 @@ from conftest import bare
 
 from cloning import clone_shapes, clone_with_report
 from cloning.contours import CONTOURS, contour_places
-from cloning.labels import label, visible
+from cloning.labels import label
 from cloning.prepare import prepare
+from cloning.visibility import visible
 from fat import AnimatableFace
 from fat.build import face_motions
 from fba import FaceScene, FeaturePoints, PolyMesh, Role
