@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cloning.align import anchor_ids
 from cloning.backends import SkinTransfer
 from cloning.bind import Binding
 from cloning.bodies import Body, Mover, body, eye_mover, teeth_mover, tongue_mover
@@ -146,10 +145,11 @@ def build_face_transfer(
     ----------
     as_published : teeth and tongue only translate, nothing rides on the skin, feature points are not corrected.
     """
-    ids = tuple(anchor_ids(source.skin, target.skin))
-    if 1 in target.labels.sealed:
-        ids = tuple(i for i in ids if i not in INNER_LIPS)
+    ids, doubled = _measured(source, target)
     bodies, findings = _pair(source, target, as_published)
+    if doubled:
+        text = f"feature points {', '.join(doubled)} lie at the place of another point; they move like that one"
+        findings.append(Finding("warning", "doubled-points", text, target.scene.name))
     bindings: dict[str, Binding] = {}
     if not as_published:
         for shape in target.scene.with_role(Role.OTHER):
@@ -167,6 +167,24 @@ def build_face_transfer(
         None if as_published else eye_guard(source, target, skin.carry),
         tuple(findings),
     )
+
+
+def _measured(source: PreparedFace, target: PreparedFace) -> tuple[tuple[str, ...], list[str]]:
+    """Feature points that can be made exact one by one, and those at the very place of another.
+
+    Points of touching lips are at one place in space, but on different vertices.
+    """
+    taken: dict[tuple[tuple[int, float], ...], str] = {}
+    doubled: list[str] = []
+    for key, (vertices, weights) in target.skin.points.items():
+        if key not in source.skin.points or (1 in target.labels.sealed and key in INNER_LIPS):
+            continue
+        place = tuple(sorted((int(v), round(float(w), 3)) for v, w in zip(vertices, weights, strict=True) if w > 1e-3))
+        if place in taken:
+            doubled.append(key)
+        else:
+            taken[place] = key
+    return tuple(taken.values()), doubled
 
 
 def _pair(

@@ -8,6 +8,7 @@ import pytest
 from cloning.align import radial_warp
 from cloning.antialias import circle_samples, edge_samples
 from cloning.cylinder import cylinder
+from cloning.eyeballs import Ball, EyeGuard
 from cloning.fill import HarmonicFill
 from cloning.locate import closest, closest_on_triangles
 from cloning.normalize import blend, units_of
@@ -185,3 +186,33 @@ def test_filter_stays_within_support_and_label() -> None:
     dense = edge_samples(mesh.vertices, normals, mesh.edges, labels, np.full(9, 0.5))
     assert len(dense.owners) == 0, "a coarse source needs no filter"
     assert np.allclose(np.linalg.norm(circle_samples(np.zeros((1, 2)))[0], axis=1), 0.02)
+
+
+def ball(radius: float, skin: np.ndarray) -> Ball:
+    """A sphere about the origin and skin points near it."""
+    way = np.random.default_rng(8).normal(size=(2000, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    return Ball(np.zeros(3), way, np.full(2000, radius), np.arange(len(skin)), skin)
+
+
+def test_lids_are_pushed_off_a_larger_ball_but_only_forward() -> None:
+    place = np.array([[0.0, 0.8, 0.82], [0.0, -0.9, 0.9]])
+    down = np.zeros((2, 1, 3))
+    down[0, 0, 1] = -0.7
+    mine, yours = ball(0.8, place), ball(1.0, place)
+    motion = down.copy()
+    EyeGuard([mine], [yours], lambda field: field).apply(down, motion)
+    assert np.array_equal(motion[:, :, :2], down[:, :, :2]), "x and y hold the FAP's amount"
+    assert not motion[1].any(), "what rests stays"
+    assert np.linalg.norm(place[0] + motion[0, 0]) >= 1.0
+    assert motion[0, 0, 2] > 0.0
+
+
+def test_a_face_of_its_own_kind_is_not_pushed() -> None:
+    random = np.random.default_rng(9)
+    place = np.concatenate([random.normal(size=(50, 2)) * 0.5, 1.0 + 0.2 * random.random((50, 1))], axis=1)
+    offsets = random.normal(size=(50, 3, 3)) * 0.3
+    same = ball(1.0, place)
+    motion = offsets.copy()
+    EyeGuard([same], [same], lambda field: field).apply(offsets, motion)
+    assert np.allclose(motion, offsets)

@@ -135,3 +135,17 @@ def test_ict_facekit(shared: Path, source: AnimatableFace) -> None:
     assert report.measures["fp_error_after"] < 0.01
     assert report.measures["fp_error_before"] < 0.10
     assert not report.warnings()
+
+
+def test_points_at_one_place_are_said_and_break_nothing(source: AnimatableFace) -> None:
+    scene, points = bare(source)
+    joined = points.with_points({"8.1": points["2.2"], "4.3": points["4.1"]})
+    face, report = clone_with_report(source, scene, joined, faps=(4, 31, 35, 51))
+    for fap in (4, 31, 35, 51):
+        moved, own = (
+            np.linalg.norm(face_motions(f, [(fap, 1)])[-1].offsets["skin"], axis=1).max() for f in (face, source)
+        )
+        assert moved < 2.0 * own, fap
+    doubled = next(f for f in report.warnings() if f.code == "doubled-points")
+    assert "8.1" in doubled.message
+    assert "4.3" in doubled.message
