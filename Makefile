@@ -18,8 +18,9 @@ test: $(VENV)/.installed-test peers
 # Fidelity and speed tables; see docs/benchmarks.md.
 benchmark: $(VENV)/.installed-test
 	$(BIN)/python -m benchmarks.playback
-	$(BIN)/python -m benchmarks.cloning
-	$(BIN)/python -m benchmarks.fidelity -o out/fidelity
+	$(BIN)/python -m benchmarks.format_speed
+	$(BIN)/python -m benchmarks.clone_speed
+	$(BIN)/python -m benchmarks.fidelity --sheets out/fidelity
 
 # Rebuild every shipped face and stream from its origin (needs the package index).
 samples: $(VENV)/.installed-samples

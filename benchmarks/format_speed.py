@@ -1,4 +1,4 @@
-"""How long every format takes to read and write: ``python -m benchmarks.formats``.
+"""How long every format takes to read and write: ``python -m benchmarks.format_speed``.
 
 A grid of 100,000 vertices with uv goes through every mesh format; the shipped source with all its tables through
 every format that carries tables. PyVRML97, where it is installed, reads the same VRML file in the same run.
