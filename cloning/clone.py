@@ -52,7 +52,7 @@ class _Stages:
 
 
 def clone(
-    source: AnimatableFace,
+    source: FaceScene | AnimatableFace,
     onto: FaceScene | AnimatableFace,
     landmarks: FeaturePoints | None = None,
     *,
@@ -71,7 +71,7 @@ def clone(
 
 
 def clone_with_report(
-    source: AnimatableFace,
+    source: FaceScene | AnimatableFace,
     onto: FaceScene | AnimatableFace,
     landmarks: FeaturePoints | None = None,
     *,
@@ -84,7 +84,7 @@ def clone_with_report(
 
     Parameters
     ----------
-    source : a face with Facial Animation Tables.
+    source : a face with Facial Animation Tables (what `formats.read` returns for one).
     onto : the target; its vertices, their order, polygons and materials stay as they are.
     landmarks : feature points of the target; None uses those that `onto` carries.
     backend : name of a registered backend.
@@ -102,8 +102,13 @@ def clone_with_report(
     LandmarkError
         If feature points are missing.
     CloningError
-        If the backend is not known or the source has no motion of these FAPs.
+        If the backend is not known, or the source has no tables or no motion of these FAPs.
     """
+    if not isinstance(source, AnimatableFace):
+        raise CloningError(
+            f"the source '{getattr(source, 'name', source)}' holds no Facial Animation Tables, so it has no motion to "
+            "clone; clone_shapes carries its morph targets"
+        )
     way = find_backend(backend)
     stages = _Stages(progress, {})
     scene, points = _target(onto, landmarks)

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import bare, roleless, warped
+from remade import bare, roleless, warped
 
-from cloning import clone_shapes, clone_with_report
+from cloning import clone, clone_shapes, clone_with_report
 from cloning.normalize import ratios
 from cloning.report import CloneReport
 from fat import AnimatableFace
@@ -15,6 +15,8 @@ from fat.evaluate import Player
 from fba import FaceScene, FeaturePoint, FeaturePoints, Frame, Role, ShapeSet
 from fba.arrays import Floats
 from fba.errors import CloningError, LandmarkError
+from formats import read_scene
+from samples import sample
 
 FEW = (3, 5, 12, 19, 31)
 
@@ -279,3 +281,9 @@ def test_same_input_same_output(source: AnimatableFace, wide: tuple[FaceScene, F
         for m, n in zip(a.meshes, b.meshes, strict=True):
             assert m.displacements.tobytes() == n.displacements.tobytes()
     assert first.scene.frame.identity == Frame().identity
+
+
+def test_a_source_without_tables_is_refused() -> None:
+    head = read_scene(sample("faces/tri_head.obj"))
+    with pytest.raises(CloningError, match="no Facial Animation Tables"):
+        clone(head, head)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import bare
+from remade import bare
 
 from cloning import clone_shapes, clone_with_report
 from cloning.contours import CONTOURS, contour_places
