@@ -18,7 +18,7 @@ from cloning.transfer import FaceTransfer, build_face_transfer
 from fat.build import build_tables
 from fat.face import AnimatableFace
 from fat.motion import FaceMotion
-from fat.rig import EYE_FAPS, HEAD_FAPS, rig_eye, rig_head
+from fat.rig import EYE_FAPS, HEAD_FAPS, rig_eye, rig_head, unrig
 from fat.tables import FaceDefTransform
 from fba.arrays import Floats
 from fba.errors import CloningError, LandmarkError
@@ -174,7 +174,7 @@ def clone_shapes(
 
 def _target(onto: FaceScene | AnimatableFace, landmarks: FeaturePoints | None) -> tuple[FaceScene, FeaturePoints]:
     if isinstance(onto, AnimatableFace):
-        return onto.scene, onto.feature_points if landmarks is None else landmarks
+        return unrig(onto), onto.feature_points if landmarks is None else landmarks
     if landmarks is None:
         raise LandmarkError(
             f"'{onto.name}' carries no feature points. Give them as landmarks: a file NAME.fps.json beside the mesh, "

@@ -7,11 +7,13 @@ in `center`; the rest pose of every existing node stays what it was.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from fat.face import AnimatableFace
 from fat.tables import FaceDefTransform, TransformField
 from fba.arrays import Floats
 from fba.faps import fap
@@ -21,6 +23,9 @@ HEAD_FAPS = (("head_yaw", 49), ("head_pitch", 48), ("head_roll", 50))
 """Outermost first: R = Ry * Rx * Rz. No public source states the standard's order; this one is documented."""
 
 EYE_FAPS = {"left": (("yaw", 23), ("pitch", 25)), "right": (("yaw", 24), ("pitch", 26))}
+
+OWN_NAMES = re.compile(r"(head_(yaw|pitch|roll)|eye_(left|right)(_.+)?_(yaw|pitch))(_\d+)?")
+"""Names that `rig_head` and `rig_eye` give."""
 
 RigTables = dict[tuple[int, int], tuple[FaceDefTransform, ...]]
 
@@ -73,6 +78,28 @@ def rig_eye(scene: FaceScene, side: str, shapes: Sequence[str], center: Floats) 
         for name, (_, number) in zip(names, EYE_FAPS[side], strict=True):
             collected.setdefault((number, 1), []).append(_rotation(name, number, matrix[:3, :3]))
     return scene, {key: tuple(values) for key, values in collected.items()}
+
+
+def unrig(face: AnimatableFace) -> FaceScene:
+    """Return the scene without the Transforms that `rig_head` and `rig_eye` put into it.
+
+    Known by their names, driven by the tables, doing nothing at rest. So a face that is cloned onto once more does
+    not carry a second set of them; nodes of anybody else's stay.
+    """
+    driven = {entry.transform for table in face.tables for entry in table.transforms}
+
+    def idle(node: Node) -> bool:
+        if not (isinstance(node, Transform) and node.name in driven and OWN_NAMES.fullmatch(node.name)):
+            return False
+        return np.array_equal(node.matrix(), np.eye(4))
+
+    def visit(node: Node) -> tuple[Node, ...]:
+        if not isinstance(node, Transform):
+            return (node,)
+        children = tuple(kept for child in node.children for kept in visit(child))
+        return children if idle(node) else (replace(node, children=children),)
+
+    return replace(face.scene, roots=tuple(kept for root in face.scene.roots for kept in visit(root)))
 
 
 def _rotation(name: str, number: int, linear: Floats) -> FaceDefTransform:

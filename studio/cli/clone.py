@@ -71,7 +71,7 @@ def _clone_face(
     from formats import format_of, read, read_face, write
     from formats.landmarks import read_landmarks
     from studio.cli.console import console, print_findings, progress
-    from studio.inputs import points_of, scene_of
+    from studio.inputs import points_of
     from studio.sheet import contact_sheet, save_png
 
     entry = format_of(output, writing=True)
@@ -85,9 +85,8 @@ def _clone_face(
         tell("reading", 0.0)
         found = read(target)
         points_given = points_of(found, target, landmarks)
-        scene = scene_of(found)
         face, made = clone_with_report(
-            animatable, scene, points_given, backend=backend, as_published=as_published, faps=faps, progress=tell
+            animatable, found, points_given, backend=backend, as_published=as_published, faps=faps, progress=tell
         )
         tell("writing", 0.95)
         write(face, output)

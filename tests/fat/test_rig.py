@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fat.rig import rig_eye, rig_head
-from fba import FaceScene, PolyMesh, Shape, Transform
+from fat import AnimatableFace, FaceDefTable, FaceDefTables
+from fat.rig import rig_eye, rig_head, unrig
+from fba import FaceScene, Fapu, FeaturePoints, PolyMesh, Shape, Transform
 from fba.scene import rotation_matrix
 
 TRIANGLE = PolyMesh.from_faces([[0, 0, 1.0], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
@@ -73,3 +74,15 @@ def test_names_that_are_taken_are_not_used_twice() -> None:
     rigged, tables = rig_head(scene, np.zeros(3))
     assert tables[49, 1][0].transform == "head_yaw_2"
     assert len({t.name for t in rigged.transforms}) == 4
+
+
+def test_unrigging_takes_out_what_rigging_put_in_and_nothing_else() -> None:
+    scene = FaceScene((Transform("mine", _scene().roots),))
+    rigged, eyes = rig_eye(scene, "left", ["eye"], np.array([1.0, 2.0, 4.0]))
+    rigged, head = rig_head(rigged, np.array([0.0, -1.0, 0.0]))
+    idle = FaceDefTable(25, 1, (), (replace(eyes[25, 1][0], transform="mine"),))
+    driven = [FaceDefTable(*key, (), entries) for key, entries in {**eyes, **head}.items() if key != (25, 1)]
+    turning = replace(idle, transforms=(*idle.transforms, *eyes[25, 1]))
+    face = AnimatableFace(rigged, FeaturePoints({}), FaceDefTables((*driven, turning)), Fapu(1, 1, 1, 1, 1))
+    assert [t.name for t in unrig(face).transforms] == ["mine", "holder"]
+    assert unrig(replace(face, tables=FaceDefTables())).transforms == rigged.transforms
