@@ -15,6 +15,9 @@ def play(
     stream: Annotated[Path, typer.Argument(help="A .fap stream; 'demo' names the shipped one.")],
     output: OutPath,
     size: Annotated[int, typer.Option(min=32, max=4096, help="Height and width of the picture in pixels.")] = 360,
+    hold: Annotated[
+        bool, typer.Option("--hold", help="A FAP that a frame leaves out keeps its last value instead of 0.")
+    ] = False,
 ) -> None:
     """Play a FAP stream on a face: into .gif, .mp4, a folder of .png, or .npz (vertices of every frame)."""
     from fba.errors import UnknownFormatError
@@ -30,6 +33,8 @@ def play(
     animatable = read_face(str(face))
     path = sample("streams/demo.fap") if str(stream) == "demo" else stream
     frames, findings = read_fap(path)
+    if hold:
+        frames = frames.held()
     out = console()
     print_findings(findings, out)
     with progress() as tell:

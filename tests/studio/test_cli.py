@@ -8,6 +8,7 @@ import resource
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +127,21 @@ def test_play_writes_vertices_in_the_files_own_order(cloned: Path, tmp_path: Pat
     assert vertices.shape[1:] == neutral.shape
     assert rate == 25
     assert np.abs(vertices - neutral).max() > 0
+
+
+def test_play_holds_values_on_request(cloned: Path, tmp_path: Path) -> None:
+    stream = FapStream.build(25.0, 2, {3: [500, 0]})
+    mask = stream.mask.copy()
+    mask[1] = False
+    write_fap(replace(stream, mask=mask), tmp_path / "gap.fap")
+    moved = []
+    for words in ((), ("--hold",)):
+        assert fba("play", cloned, tmp_path / "gap.fap", "-o", tmp_path / "o.npz", *words).exit_code == 0
+        with np.load(tmp_path / "o.npz") as played:
+            moved.append(np.abs(played["vertices"] - played["neutral"]).max(axis=(1, 2)))
+    assert moved[0][0] > 0
+    assert moved[0][1] == 0
+    assert moved[1][1] == moved[1][0]
 
 
 def test_play_draws(cloned: Path, tmp_path: Path) -> None:
