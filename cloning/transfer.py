@@ -14,6 +14,7 @@ from cloning.correct import Correction, correction
 from cloning.eyeballs import EyeGuard, eye_guard
 from cloning.normalize import ratios
 from cloning.prepare import PreparedFace
+from cloning.rims import RimFollower, rim_follower
 from fba.arrays import Floats
 from fba.findings import Finding
 from fba.scene import Role
@@ -59,6 +60,7 @@ class FaceTransfer:
     ids : the feature points that are measured (and corrected).
     bodies : (source's body, target's body, mover) of each part that both faces have.
     bindings : shape name -> how it rides on the skin.
+    rims : closes the lids along their whole length; None in published mode.
     guard : keeps the skin off the eyeballs; None in published mode.
     """
 
@@ -69,6 +71,7 @@ class FaceTransfer:
     ids: tuple[str, ...]
     bodies: Sequence[tuple[Body, Body, Callable[[dict[str, Floats]], Mover]]]
     bindings: Mapping[str, Binding]
+    rims: RimFollower | None = None
     guard: EyeGuard | None = None
     findings: tuple[Finding, ...] = ()
     tally: Tally = field(default_factory=Tally)
@@ -102,6 +105,8 @@ class FaceTransfer:
         moving = np.stack([self.source.skin.join(m) for m in motions], axis=1)
         skin = self.skin.apply(moving)
         self._correct(moving, skin)
+        if self.rims is not None:
+            self.rims.apply(moving, skin)
         if self.guard is not None:
             self.guard.apply(moving, skin)
         done: dict[str, Floats] = dict(self.target.skin.split(skin))
@@ -164,6 +169,7 @@ def build_face_transfer(
         ids,
         bodies,
         bindings,
+        None if as_published else rim_follower(source, target),
         None if as_published else eye_guard(source, target, skin.carry),
         tuple(findings),
     )

@@ -7,21 +7,22 @@ from functools import cached_property
 
 import numpy as np
 
-from fba.arrays import Bools, Floats
+from cloning.prepare import prepare
+from cloning.rims import Eye, eyes
+from fba.arrays import Floats
 from fba.fapu import FAPU_DIVISOR
-from samples.build.contact import LIDS, edge_line, side_mask
 from samples.build.geodesic import smoothstep
 from samples.build.head import Head
 
-LID_REACH = 0.1
-"""How far from its rim a lid follows the correction of the closing line, in ES0."""
-CORNER = 0.25
-"""Share of the opening's width over which the correction fades towards each corner."""
+OVERLAP = 0.04
+"""A rim goes this share of the eye's opening beyond the other one, but for its feature point, which goes exactly its
+way."""
+BESIDE = 0.2
+"""Share of the way from the feature point to each corner over which the overlap grows."""
 CLEARANCE = 1.01
 """Skin that lies on the eyeball stays this far from its centre (radii), or as far as it is in the neutral face."""
 OUTSIDE = 0.99
 """Skin nearer to the centre than this (radii) in the neutral face is the inside of the socket."""
-PASSES = 5
 
 
 @dataclass(frozen=True)
@@ -40,19 +41,13 @@ class Lid:
         skin : (n, 3) offsets at `value`.
         value : of the FAP; 1024 brings the rims together, so does any pair of upper and lower values of that sum.
         """
-        edge = LIDS[self.side, self.part]
-        own, other = self._rest(self.part), self._rest("lower" if self.part == "upper" else "upper")
-        goal = own[:, 1] + value / FAPU_DIVISOR * (other[:, 1] - own[:, 1])
-        x = self.head.parts["skin"][:, 0]
-        rim = np.column_stack([np.interp(x, self._span, own[:, k]) for k in (1, 2)])
-        away = np.linalg.norm(self.head.parts["skin"][:, 1:] - rim, axis=1) / (LID_REACH * self.head.fapu.es0)
-        ends = np.minimum(x - self._span[0], self._span[-1] - x) / (CORNER * (self._span[-1] - self._span[0]))
-        fall = (1.0 - smoothstep(away)) * smoothstep(ends) * self._mask
+        eye, es0 = self._eye, self.head.fapu.es0
+        part = ("upper", "lower").index(self.part)
+        beside = smoothstep(np.abs(np.linspace(-1.0, 1.0, len(eye.open) + 2)[1:-1]) / BESIDE)
+        beyond = OVERLAP * eye.opening.max() / np.where(eye.open, eye.opening, np.inf)
+        travel = value / FAPU_DIVISOR * (1.0 + beside * beyond)
         out = skin.copy()
-        for _ in range(PASSES):
-            line = edge_line(self.head, edge, self._mask, self._span, out).points
-            missing = goal - line[:, 1]
-            out[:, 1] += fall * np.interp(x + out[:, 0], self._span, missing, left=0.0, right=0.0)
+        out[eye.lids[part].vertices, 1] += es0 * eye.follow(part, skin / es0, travel, 0.0)
         return out
 
     def over_eyeball(self, skin: Floats) -> Floats:
@@ -71,17 +66,8 @@ class Lid:
         return out
 
     @cached_property
-    def _mask(self) -> Bools:
-        return side_mask(self.head, LIDS[self.side, self.part])
-
-    @cached_property
-    def _span(self) -> Floats:
-        """Slices from corner to corner; the corners themselves stay."""
-        first, _, last = (self.head.positions[k][0] for k in LIDS[self.side, self.part].guide)
-        margin = 0.04 * (last - first)
-        span: Floats = np.linspace(first + margin, last - margin, 61)
-        return span
-
-    def _rest(self, part: str) -> Floats:
-        edge = LIDS[self.side, part]
-        return edge_line(self.head, edge, side_mask(self.head, edge), self._span).points
+    def _eye(self) -> Eye:
+        face = prepare(self.head.scene, self.head.points, "source")
+        found = eyes(face)[("left", "right").index(self.side)]
+        assert found is not None, self.head.name
+        return found

@@ -58,14 +58,13 @@ class MotionBuilder:
         full = dict(motion.offsets)
         if motion.value < 0:
             return [motion]
-        skin = lid.closing(full["skin"], motion.value)
         own = fap(motion.fap_id or 0).feature_points[0]
-        skin *= self.correction.at(own, full["skin"])[1] / self.correction.at(own, skin)[1]
         steps = []
         for value in range(LID_STEP, motion.value + 1, LID_STEP):
-            share = value / motion.value
-            part = {name: share * offsets for name, offsets in full.items()}
-            steps.append(replace(motion, value=value, offsets=self._with_skin(part, lid.over_eyeball(share * skin))))
+            part = {name: value / motion.value * offsets for name, offsets in full.items()}
+            skin = lid.closing(part["skin"], value)
+            skin *= self.correction.at(own, part["skin"])[1] / self.correction.at(own, skin)[1]
+            steps.append(replace(motion, value=value, offsets=self._with_skin(part, lid.over_eyeball(skin))))
         return steps
 
     def _border(self, recipe: Recipe, border: Border) -> FaceMotion:
@@ -155,7 +154,7 @@ TONGUE_UP = "tongueUp"
 """Name of a pose's own unit beside MakeHuman's."""
 TIP_LIFT = 0.2
 """Height of the tongue's tip in that unit, in ES0."""
-LID_STEP = 256
+LID_STEP = 128
 """Between the borders of a closing lid: the chord of each step stays within 0.4 % of the eyeball's radius."""
 STEEPEST = 0.4
 """Squared cosine between a direction and the surface below which skin no longer slides the whole way."""

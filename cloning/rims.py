@@ -1,0 +1,310 @@
+"""The rims of the lids: how far they have gone towards each other, and how to take them where they should be.
+
+Seen from the front an eye is open between two lines: the lowest points of the upper lid and the highest ones of the
+lower lid, slice by slice of constant x. MPEG-4 measures them at one place; elsewhere meshes differ, and a rim that
+stays behind shows a slit of eyeball between closed lids.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cloning.eyeballs import FAR, balls
+from cloning.prepare import PreparedFace
+from cloning.surface import Surface
+from fba.arrays import Bools, Floats, Ints
+
+SLICES = 24
+"""Slices from a corner of the eye to the lids' feature points, and from there to the other corner."""
+
+REACH = 0.11
+"""How far from its rim, in eye separations, a lid gives way to it."""
+
+ROUND = 1.7
+"""An opening that is this much larger than an arc's at the same place was not measured between the rims."""
+
+NARROW = 0.4
+"""Slices that are less open than this share of the middle are left alone."""
+
+BURIED = 0.01
+"""What lies deeper in the eyeball at rest, in radii, is the back of a lid and never its rim."""
+
+STIFF = 100.0
+"""How much a difference between neighbours counts against a vertex's own way."""
+
+FIXED = 1e6
+"""Weight of what must stay: feature points."""
+
+FIRM = 1e-3
+"""Softness of a slice, relative to the skin's: how exactly the rim is met."""
+
+PASSES = 4
+
+FARTHEST = 0.2
+"""No vertex is lifted by more than this share of the eye's opening."""
+
+CLOSES = 0.15
+"""Rims are watched in motions that take one at least this share of the opening towards the other."""
+
+SPARE = 0.1
+"""How much farther than the source's, as a share of the opening, a rim may go."""
+
+EYES = (
+    (("3.11", "3.7"), (("3.1", 3, 1), ("3.3", 4, -1))),
+    (("3.12", "3.8"), (("3.2", 5, 1), ("3.4", 6, -1))),
+)
+"""Corners by rising x; feature point, label and side (1 upper, -1 lower) of each lid."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lid:
+    """One lid near its rim.
+
+    Attributes
+    ----------
+    side : 1 upper (its rim is its lowest line), -1 lower.
+    vertices : (m,) of the skin.
+    edges : (e, 2) between them, as rows of `vertices`.
+    rest : (m, 3) where they rest, in eye separations.
+    clear : (m,) clearance from the eyeball at rest, in radii.
+    span : (s,) x of the slices.
+    compliance : (m, m) how far each vertex follows a push at another one; 0 at feature points.
+    """
+
+    side: int
+    vertices: Ints
+    edges: Ints
+    rest: Floats
+    clear: Floats
+    span: Floats
+    compliance: Floats
+
+    def rim(self, places: Floats) -> tuple[Floats, Ints, Floats]:
+        """Find the rim of the displaced lid.
+
+        Returns
+        -------
+        heights : (s,) NaN where the lid does not reach.
+        edges : (s, 2) the vertices, as rows, between which each point of the rim lies.
+        shares : (s,) weight of the second one.
+        """
+        a, b = self.edges.T
+        xa, xb = places[a, 0], places[b, 0]
+        width = np.where(xa == xb, 1.0, xb - xa)
+        share = (self.span[:, None] - xa) / width
+        crossed = (share >= 0.0) & (share <= 1.0) & (xa != xb)
+        crossed &= self.clear[a] + share * (self.clear[b] - self.clear[a]) > -BURIED
+        height = places[a, 1] + share * (places[b, 1] - places[a, 1])
+        best = np.argmin(np.where(crossed, self.side * height, np.inf), axis=1)
+        row = np.arange(len(self.span))
+        found: Floats = np.where(crossed[row, best], height[row, best], np.nan)
+        return found, self.edges[best], share[row, best]
+
+    def lift(self, places: Floats, goal: Floats, used: Bools, spare: Floats, most: float) -> Floats:
+        """How the heights of the lid must change to bring its rim to a goal.
+
+        Parameters
+        ----------
+        places : (m, 3) the displaced lid.
+        goal : (s,) heights.
+        used : (s,) the slices that count.
+        spare : (s,) how far the rim may be beyond the goal.
+        most : how far a vertex may be lifted.
+
+        Returns
+        -------
+        (m,) offsets along y.
+        """
+        lifted = np.zeros(len(places))
+        for _ in range(PASSES):
+            now, edges, shares = self.rim(places + np.column_stack([0.0 * lifted, lifted, 0.0 * lifted]))
+            missing = goal - now
+            beyond = np.maximum(self.side * missing - spare, 0.0) * self.side
+            missing = np.where(self.side * missing > 0.0, beyond, missing)
+            rows = used & np.isfinite(missing)
+            if not rows.any():
+                break
+            (a, b), t = edges[rows].T, shares[rows]
+            follow = self.compliance[:, a] * (1.0 - t) + self.compliance[:, b] * t
+            between = follow[a] * (1.0 - t)[:, None] + follow[b] * t[:, None]
+            between[np.diag_indices(len(t))] += FIRM * float(np.trace(between)) / len(t)
+            lifted += follow @ np.linalg.solve(between, missing[rows])
+            lifted = np.clip(lifted, -most, most)
+        return lifted
+
+
+@dataclass(frozen=True, eq=False)
+class Eye:
+    """Two lids and the opening between them.
+
+    Attributes
+    ----------
+    lids : upper, lower.
+    heights : (2, s) of their rims at rest.
+    open : (s,) slices in which the lids were found and are apart.
+    """
+
+    lids: tuple[Lid, Lid]
+    heights: Floats
+    open: Bools
+
+    @property
+    def opening(self) -> Floats:
+        """(s,) distance of the rims at rest; 0 where they were not found."""
+        return np.where(self.open, self.heights[0] - self.heights[1], 0.0)
+
+    def travel(self, part: int, offsets: Floats) -> Floats:
+        """Share of the opening that a rim goes towards the other one, (s,); even beyond the open slices.
+
+        Parameters
+        ----------
+        part : 0 upper, 1 lower.
+        offsets : (n, 3) of the whole skin, in eye separations.
+        """
+        lid = self.lids[part]
+        now = lid.rim(lid.rest + offsets[lid.vertices])[0]
+        used = self.open & np.isfinite(now)
+        row = np.arange(len(now))
+        share = (now[used] - self.heights[part, used]) / (self.heights[1 - part, used] - self.heights[part, used])
+        return np.interp(row, row[used], share)
+
+    def follow(self, part: int, offsets: Floats, travel: Floats, spare: float) -> Floats:
+        """Offsets (m,) along y that bring a rim a share of the way to the other one.
+
+        Parameters
+        ----------
+        spare : how much farther it may be, as a share of the opening.
+        """
+        lid = self.lids[part]
+        way = self.heights[1 - part] - self.heights[part]
+        goal = self.heights[part] + travel * way
+        return lid.lift(
+            lid.rest + offsets[lid.vertices], goal, self.open, spare * np.abs(way), FARTHEST * self.opening.max()
+        )
+
+
+def eyes(face: PreparedFace) -> list[Eye | None]:
+    """The left and the right eye of a face; None where lids are missing, grown together or too coarse."""
+    clear = np.full(face.skin.vertex_count, np.inf)
+    for ball in balls(face):
+        clear[ball.vertices] = np.minimum(clear[ball.vertices], ball.clearance(ball.rest - ball.center))
+    clear[~np.isfinite(clear)] = FAR
+    return [_eye(face, clear, corners, lids) for corners, lids in EYES]
+
+
+def _eye(
+    face: PreparedFace, clear: Floats, corners: tuple[str, str], keys: Sequence[tuple[str, int, int]]
+) -> Eye | None:
+    surface, labels = face.skin, face.labels
+    if any(k not in surface.points for k in (*corners, keys[0][0], keys[1][0])) or keys[0][1] in labels.sealed:
+        return None
+    first, last = (surface.positions[k] for k in corners)
+    lids = []
+    for key, label, side in keys:
+        guide = np.array([first, surface.positions[key], last])
+        lid = _lid(surface, clear, np.flatnonzero(labels.values == label).astype(np.int32), guide, side)
+        if lid is None:
+            return None
+        lids.append(lid)
+    heights = np.array([lid.rim(lid.rest)[0] for lid in lids])
+    opening = heights[0] - heights[1]
+    middle = opening[SLICES - 1]
+    share = np.linspace(-1.0, 1.0, 2 * SLICES + 1)[1:-1]
+    with np.errstate(invalid="ignore"):
+        used = (opening > NARROW * middle) & (opening < ROUND * middle * (1.0 - share**2))
+    if not middle > 0.0 or used.sum() < SLICES:
+        return None
+    return Eye((lids[0], lids[1]), heights, used)
+
+
+def _lid(surface: Surface, clear: Floats, vertices: Ints, guide: Floats, side: int) -> Lid | None:
+    if len(vertices) < 3 or not guide[0, 0] < guide[1, 0] < guide[2, 0]:
+        return None
+    halves = [np.linspace(guide[k, 0], guide[k + 1, 0], SLICES + 1) for k in range(2)]
+    span = np.concatenate([halves[0][1:], halves[1][1:-1]])
+    near = _away(surface.vertices[vertices], guide) < 2.0 * REACH
+    lid = _assemble(surface, clear, vertices[near], span, side, np.zeros(0))
+    if lid is None:
+        return None
+    heights, edges, shares = lid.rim(lid.rest)
+    found = np.isfinite(heights)
+    a, b = (lid.rest[edges[found, k]] for k in range(2))
+    line = a + shares[found, None] * (b - a)
+    if not len(line):
+        return None
+    away = np.linalg.norm(lid.rest[:, None] - line[None], axis=2).min(axis=1)
+    kept = away < REACH
+    return _assemble(surface, clear, lid.vertices[kept], span, side, away[kept])
+
+
+def _assemble(surface: Surface, clear: Floats, vertices: Ints, span: Floats, side: int, away: Floats) -> Lid | None:
+    """A lid of these vertices; away (m,) from the rim, or empty for one that is only measured."""
+    row = np.full(surface.vertex_count, -1, dtype=np.int32)
+    row[vertices] = np.arange(len(vertices))
+    edges = row[surface.edges]
+    edges = edges[(edges >= 0).all(axis=1)]
+    if len(edges) < 3:
+        return None
+    compliance = _compliance(surface, vertices, edges, away) if len(away) else np.zeros((0, 0))
+    return Lid(side, vertices, edges, surface.vertices[vertices], clear[vertices], span, compliance)
+
+
+def _compliance(surface: Surface, vertices: Ints, edges: Ints, away: Floats) -> Floats:
+    """Inverse stiffness of a lid that is soft at its rim, firm at REACH, smooth, and fixed at feature points."""
+    stiffness = np.diag(1.0 + 1e3 * (away / REACH) ** 4)
+    a, b = edges.T
+    np.add.at(stiffness, (a, a), STIFF)
+    np.add.at(stiffness, (b, b), STIFF)
+    np.add.at(stiffness, (a, b), -STIFF)
+    np.add.at(stiffness, (b, a), -STIFF)
+    points = surface.point_matrix(list(surface.points))[:, vertices].toarray()
+    stiffness += FIXED * points.T @ points
+    found: Floats = np.linalg.inv(stiffness)
+    return found
+
+
+def _away(places: Floats, guide: Floats) -> Floats:
+    """Distance of (n, 3) places from a polyline."""
+    best = np.full(len(places), np.inf)
+    for k in range(len(guide) - 1):
+        step = guide[k + 1] - guide[k]
+        t = np.clip((places - guide[k]) @ step / max(float(step @ step), 1e-18), 0.0, 1.0)
+        best = np.minimum(best, np.linalg.norm(places - guide[k] - t[:, None] * step, axis=1))
+    return best
+
+
+@dataclass(frozen=True, eq=False)
+class RimFollower:
+    """Takes the rims of a target's lids as far, slice by slice, as the source's: closed lids leave no slit.
+
+    Attributes
+    ----------
+    mine, yours : eyes of source and target.
+    units : eye separation of source and target, mesh units.
+    """
+
+    mine: Sequence[Eye | None]
+    yours: Sequence[Eye | None]
+    units: tuple[float, float]
+
+    def apply(self, source_motion: Floats, motion: Floats) -> None:
+        """Correct (n_t, K, 3) offsets in place, given the source's (n_s, K, 3); feature points stay exact."""
+        for mine, yours in zip(self.mine, self.yours, strict=True):
+            if mine is None or yours is None:
+                continue
+            for part in range(2):
+                moving = np.any(source_motion[mine.lids[part].vertices] != 0.0, axis=(0, 2))
+                for k in np.flatnonzero(moving):
+                    travel = mine.travel(part, source_motion[:, k] / self.units[0])
+                    if travel.max() > CLOSES:
+                        lift = yours.follow(part, motion[:, k] / self.units[1], travel, SPARE)
+                        motion[yours.lids[part].vertices, k, 1] += lift * self.units[1]
+
+
+def rim_follower(source: PreparedFace, target: PreparedFace) -> RimFollower:
+    """The follower of a pair of faces."""
+    found = (eyes(face) for face in (source, target))
+    return RimFollower(*found, (source.fapu.es0, target.fapu.es0))
