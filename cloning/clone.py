@@ -123,6 +123,10 @@ def clone_with_report(
     cloned = [replace(m, offsets=o) for m, o in zip(motions, offsets, strict=True) if o]
     rigged, transforms, said = _rig(yours, turning, wanted, as_published)
     tables = stages.run("tables", lambda: build_tables(rigged, yours.fapu, cloned, transforms))
+    if not len(tables):
+        raise CloningError(
+            f"the source '{source.scene.name}' holds no motion of these FAPs that '{scene.name}' can take"
+        )
     face = AnimatableFace(
         rigged,
         yours.points,

@@ -35,6 +35,18 @@ def read_bytes(path: Path, limit: int = 2 << 30) -> bytes:
     return data
 
 
+def require_folder(path: Path) -> None:
+    """Refuse an output early, before long work, when its folder is not there.
+
+    Raises
+    ------
+    OutputFileError
+        If the folder of `path` does not exist or is no folder.
+    """
+    if not path.parent.is_dir():
+        raise OutputFileError(f"cannot write {path}: there is no folder {path.parent}; make it first")
+
+
 @contextmanager
 def atomic_output(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside `path` (same extension); rename it onto `path` when the block succeeds.

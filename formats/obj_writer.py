@@ -9,7 +9,7 @@ import numpy as np
 from fba.arrays import Floats, Ints
 from fba.mesh import PolyMesh
 from fba.scene import FaceScene
-from formats.files import write_bytes
+from formats.files import atomic_output, write_bytes
 from formats.gathered import GatheredMesh, gather_mesh, original_order
 from formats.mtl import format_mtl
 
@@ -36,10 +36,16 @@ def write_obj(
     OutputFileError
         If the file cannot be written.
     """
-    text = ObjText(scene, path.with_suffix(".mtl").name, polygons=polygons, objects=objects, colors=colors)
-    if text.gathered.materials:
-        write_bytes(path.with_suffix(".mtl"), format_mtl(text.gathered.materials).encode())
-    write_bytes(path, text.of(text.gathered.mesh.vertices, normals=True))
+    library = path.with_suffix(".mtl")
+    text = ObjText(scene, library.name, polygons=polygons, objects=objects, colors=colors)
+    data = text.of(text.gathered.mesh.vertices, normals=True)
+    if not text.gathered.materials:
+        write_bytes(path, data)
+        return
+    # The mesh takes its place first: when it cannot be written, the library stays as it was too.
+    with atomic_output(library) as temporary:
+        temporary.write_bytes(format_mtl(text.gathered.materials).encode())
+        write_bytes(path, data)
 
 
 class ObjText:

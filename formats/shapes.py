@@ -207,6 +207,9 @@ def write_shapes(shapes: ShapeSet, like: FaceScene, path: Path) -> None:
         folder.replace(path)
     except OSError as error:
         raise OutputFileError(f"cannot write {path}: {error.strerror or error}") from error
+    except OutputFileError as error:
+        # The user never sees the folder's other name.
+        raise OutputFileError(str(error).replace(str(folder), str(path))) from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
+import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
+from importlib import import_module
+from multiprocessing import active_children, get_context
 from pathlib import Path
+from types import FrameType
 
 from cloning import clone_with_report
 from fat.conformance import conformance
@@ -60,11 +65,46 @@ def run_demo(folder: Path, tell: Callable[[str, float], None]) -> list[DemoRow]:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     # Spawned, not forked: a forked graphics context does not work.
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        waiting = [pool.submit(make_head, name, folder) for name in HEADS]
-        for done, _ in enumerate(as_completed(waiting), start=1):
-            tell(f"{done} of {len(HEADS)} heads", done / len(HEADS))
-        return [one.result() for one in waiting]
+    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_quietly) as pool:
+        try:
+            with _deaf_to_interrupts():
+                waiting = [pool.submit(make_head, name, folder) for name in HEADS]
+            for done, one in enumerate(as_completed(waiting), start=1):
+                one.result()
+                tell(f"{done} of {len(HEADS)} heads", done / len(HEADS))
+            return [one.result() for one in waiting]
+        except BaseException:
+            for process in active_children():
+                # More than once: a worker that is told while at one head would go on with the next.
+                while process.is_alive():
+                    process.terminate()
+                    process.join(0.1)
+            raise
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Start processes that do not hear Ctrl-C themselves: their parent ends them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _end_quietly() -> None:
+    """Let a worker take its unfinished files away when its parent ends it."""
+
+    # Loaded now: OpenUSD prints what is raised while it loads.
+    import_module("formats.usd.writer")
+
+    def leave(_number: int, _frame: FrameType | None) -> None:
+        raise SystemExit
+
+    signal.signal(signal.SIGTERM, leave)
 
 
 def make_head(name: str, folder: Path) -> DemoRow:

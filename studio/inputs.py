@@ -27,6 +27,22 @@ def points_of(found: FaceScene | AnimatableFace, file: Path, landmarks: Path | N
     return None if beside is None else read_landmarks(beside, scene_of(found))
 
 
+def missing_textures(scene: FaceScene, folder: Path) -> list[str]:
+    """Texture files that the materials name and that do not lie where a file in `folder` would look for them."""
+    named = [m.texture for shape in scene.shapes for m in shape.materials if m.texture and ":/" not in m.texture]
+    return [name for name in dict.fromkeys(named) if not (folder / name.replace("\\", "/")).exists()]
+
+
+def left_behind(scene: FaceScene, read_from: Path, written_to: Path) -> list[Finding]:
+    """Textures that lie beside the file that was read, but not beside the one that was written."""
+    gone = set(missing_textures(scene, read_from.parent))
+    lost = [name for name in missing_textures(scene, written_to.parent) if name not in gone]
+    return [
+        Finding("warning", "texture-left-behind", f"copy the texture {name} from {read_from.parent} to the new folder")
+        for name in lost
+    ]
+
+
 def target_points(
     scene: FaceScene, file: Path, landmarks: Path | None
 ) -> tuple[FaceScene, FeaturePoints | None, list[Finding]]:

@@ -51,6 +51,9 @@ def _registered(stage: Usd.Stage) -> list[Finding]:
     found = []
     for error in UsdValidation.ValidationContext(validators).Validate(stage):
         severity = _SEVERITY.get(error.GetType().name, "error")
+        if error.GetName() == "UnresolvableDependency":
+            # A texture that is not there is the material's loss; the face is whole and plays.
+            severity = "warning"
         where = ", ".join(_site(site) for site in error.GetSites())
         found.append(Finding(severity, str(error.GetName()), " ".join(error.GetMessage().split()), where))
     return sorted(found, key=lambda f: (f.where, f.code, f.message))

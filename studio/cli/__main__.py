@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from studio.cli.app import main
+from studio.cli.entry import main
 
 main()

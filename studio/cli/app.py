@@ -43,8 +43,3 @@ def _options(
     ] = False,
 ) -> None:
     del version
-
-
-def main() -> None:
-    """Entry point of the command ``fba``."""
-    app()

@@ -18,7 +18,7 @@ def parse_faps(text: str) -> tuple[int, ...]:
     Raises
     ------
     ValueError
-        If a part is neither a FAP number, a range nor a FAP name.
+        If a part is neither a FAP number, a range nor a FAP name, or there is no part.
 
     >>> parse_faps("3,12-14")
     (3, 12, 13, 14)
@@ -29,6 +29,8 @@ def parse_faps(text: str) -> tuple[int, ...]:
     for part in filter(None, (p.strip() for p in text.split(","))):
         low, dash, high = part.partition("-")
         if dash and low.isdigit() and high.isdigit():
+            if int(high) < int(low):
+                raise ValueError(f"the FAPs {part} run backwards; write {high}-{low}")
             numbers += range(int(low), int(high) + 1)
         else:
             numbers.append(int(part) if part.isdigit() else _by_name(part))
@@ -37,6 +39,8 @@ def parse_faps(text: str) -> tuple[int, ...]:
             fap(number)
         except KeyError as error:
             raise ValueError(str(error.args[0])) from None
+    if not numbers:
+        raise ValueError("no FAP is named; write numbers, ranges or names such as 3,12-14,open_jaw")
     return tuple(dict.fromkeys(numbers))
 
 

@@ -45,12 +45,30 @@ def clone(
         wanted = None if faps is None else parse_faps(faps)
     except ValueError as error:
         usage(f"--faps: {error}")
+    _check_outputs(output, report, sheet, inputs=(target, landmarks, source_landmarks, shapes))
     if shapes is not None:
         if wanted is not None or sheet is not None:
             usage("--shapes clones every shape as it is; it does not go with --faps or --sheet")
         _clone_shapes(target, output, source, landmarks, source_landmarks, shapes, backend, as_published, report)
     else:
         _clone_face(target, output, source, landmarks, source_landmarks, wanted, backend, as_published, report, sheet)
+
+
+def _check_outputs(output: Path, report: Path | None, sheet: Path | None, inputs: tuple[Path | None, ...]) -> None:
+    """Refuse what could only fail, or overwrite another file of the same call, after minutes of work."""
+    from formats.files import require_folder
+
+    if sheet is not None and sheet.suffix.lower() != ".png":
+        usage(f"--sheet {sheet}: the contact sheet is a .png")
+    taken = {path.absolute() for path in inputs if path is not None}
+    for option, path in (("--report", report), ("--sheet", sheet)):
+        if path is not None and path.absolute() in {*taken, output.absolute()}:
+            usage(f"{option} {path}: this call reads or writes that file already; choose another name")
+        if path is not None:
+            taken.add(path.absolute())
+    for path in (output, report, sheet):
+        if path is not None:
+            require_folder(path)
 
 
 def _clone_face(
@@ -71,7 +89,7 @@ def _clone_face(
     from formats import format_of, read, read_face, write
     from formats.landmarks import read_landmarks
     from studio.cli.console import console, print_findings, progress
-    from studio.inputs import points_of
+    from studio.inputs import left_behind, points_of, scene_of
     from studio.sheet import contact_sheet, save_png
 
     entry = format_of(output, writing=True)
@@ -96,7 +114,7 @@ def _clone_face(
         if report is not None:
             _write_report(made, report)
     out = console()
-    print_findings(made.findings, out)
+    print_findings((*made.findings, *left_behind(scene_of(found), target, output)), out)
     out.print(f"{output}: {len(face.tables)} tables for {face.scene.vertex_count} vertices")
 
 
@@ -119,6 +137,9 @@ def _clone_shapes(
     from studio.cli.console import console, print_findings, progress
     from studio.inputs import points_of, scene_of
 
+    stage = output.suffix.lower() in (".usd", ".usda", ".usdc")
+    if not stage and output.suffix.lower() not in (".npz", "") and not output.is_dir():
+        usage(f"{output}: shapes are written to .npz, .usda, .usdc, or a folder of OBJ (no extension)")
     neutral = read(source)
     neutral_scene = scene_of(neutral)
     neutral_points = points_of(neutral, Path(source), source_landmarks)
@@ -137,7 +158,7 @@ def _clone_shapes(
             as_published=as_published,
             progress=tell,
         )
-        if output.suffix.lower() in (".usd", ".usda", ".usdc"):
+        if stage:
             write_shape_set(scene, made, output)
         else:
             write_shapes(made, scene, output)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -20,14 +21,32 @@ STYLES = {"error": "bold red", "warning": "yellow", "info": "dim"}
 Report = Callable[[str, float], None]
 
 
+class _PlainConsole(Console):
+    """A console that leaves a reader who went away to its caller."""
+
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError
+
+
 def console() -> Console:
-    """A console on stdout; wide when it is not a terminal, so that lines are not folded in files."""
-    return Console(width=None if sys.stdout.isatty() else 200, highlight=False)
+    """A console on stdout; wide when it is not a terminal, so that lines are not folded in files.
+
+    Text is printed as it is: names from files may hold anything, square brackets included.
+    """
+    return _PlainConsole(width=None if sys.stdout.isatty() else 200, highlight=False, markup=False, emoji=False)
 
 
 def print_json(document: object) -> None:
-    """One JSON document on stdout, nothing else."""
-    print(json.dumps(document, indent=2, ensure_ascii=False))
+    """One JSON document on stdout, nothing else; numbers that JSON does not know (infinity) become null."""
+    print(json.dumps(_strict(document), indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def _strict(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {key: _strict(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_strict(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], out: Console) -> None:

@@ -19,15 +19,23 @@ def export(
 ) -> None:
     """Write a face in another format; its tables go along where the format can carry them."""
     from fat.face import AnimatableFace
+    from fat.validate import validate
+    from fba.errors import FaceDefTablesError
     from formats import format_of, read, write
-    from studio.cli.console import console
+    from studio.cli.console import console, print_findings
+    from studio.inputs import left_behind, scene_of
 
     if profile != "native":
         usage(f"--profile: there is no profile '{profile}'; known: native")
     entry = format_of(output, writing=True)
     found = read(str(face))
+    if isinstance(found, AnimatableFace):
+        broken = [f for f in validate(found) if f.severity == "error"]
+        if broken:
+            raise FaceDefTablesError(f"{face} cannot be played, so it is not exported: {broken[0].message}")
     write(found, output)
     out = console()
+    print_findings(left_behind(scene_of(found), face, output), out)
     if isinstance(found, AnimatableFace) and not entry.carries_tables:
         out.print(f"{output}: neutral mesh only, since {entry.name} cannot carry Facial Animation Tables")
     elif isinstance(found, AnimatableFace):

@@ -45,11 +45,16 @@ def _stream(file: Path) -> tuple[dict[str, Any], list[Any]]:
 
 def _face(file: Path, landmarks: Path | None) -> tuple[dict[str, Any], list[Any]]:
     from fat.face import AnimatableFace
+    from fba.findings import Finding
     from formats import read
     from studio.describe import describe_face, describe_points, describe_scene, mesh_findings
-    from studio.inputs import target_points
+    from studio.inputs import missing_textures, scene_of, target_points
 
     found = read(file)
+    textures = [
+        Finding("warning", "no-texture", f"the texture file {name} is not there")
+        for name in missing_textures(scene_of(found), file.parent)
+    ]
     if isinstance(found, AnimatableFace):
         about, findings = describe_face(found)
         kind = "animatable face"
@@ -60,14 +65,14 @@ def _face(file: Path, landmarks: Path | None) -> tuple[dict[str, Any], list[Any]
         if points is not None:
             more, neutral = describe_points(scene, points)
             about, findings = {**about, **more}, [*findings, *neutral]
-    return {"file": str(file), "kind": kind, **about}, [*mesh_findings(scene), *findings]
+    return {"file": str(file), "kind": kind, **about}, [*mesh_findings(scene), *textures, *findings]
 
 
 def _print(about: dict[str, Any], out: Any) -> None:
     from studio.cli.console import table
     from studio.describe import number_ranges
 
-    out.print(f"[bold]{about['file']}[/bold]: {about['kind']}")
+    out.print(f"{about['file']}: {about['kind']}")
     if about["kind"] == "FAP stream":
         out.print(f"{about['frames']} frames at {about['frame_rate']:g}/s, {about['seconds']:.1f} s")
         table("", ("FAP", ">lowest", ">highest"), [(k, str(a), str(b)) for k, (a, b) in about["ranges"].items()], out)

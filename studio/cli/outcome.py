@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import sys
 import traceback
 from collections.abc import Callable
@@ -24,6 +25,7 @@ class Outcome(IntEnum):
     USAGE = 2
     BAD_INPUT = 3
     INTERRUPTED = 130
+    READER_GONE = 141
 
 
 def guarded(verb: Callable[P, None]) -> Callable[P, None]:
@@ -32,19 +34,38 @@ def guarded(verb: Callable[P, None]) -> Callable[P, None]:
     @functools.wraps(verb)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
-            verb(*args, **kwargs)
+            try:
+                verb(*args, **kwargs)
+            finally:
+                sys.stdout.flush()
         except FbaError as error:
             fail(str(error))
+        except BrokenPipeError:
+            _drop_output()
+            raise typer.Exit(Outcome.READER_GONE) from None
         except KeyboardInterrupt:
             print("fba: interrupted", file=sys.stderr)
             raise typer.Exit(Outcome.INTERRUPTED) from None
-        except (OSError, MemoryError) as error:
-            fail(f"{type(error).__name__}: {error}")
+        except OSError as error:
+            _drop_output()
+            fail(f"{error.filename or 'standard output'}: {error.strerror or error}")
+        except MemoryError:
+            fail("there is not enough memory for this; close other programs or use a smaller face or stream")
         except RecursionError:
             traceback.print_exc(limit=3)
             fail("the input is nested too deeply")
 
     return run
+
+
+def _drop_output() -> None:
+    """Send what stdout still holds to nowhere, so that the interpreter does not fail on it while it ends."""
+    try:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+    except (OSError, ValueError):
+        return
 
 
 def fail(message: str) -> None:

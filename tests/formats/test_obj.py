@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fba.errors import FbaError, InputFileError, MeshError, TextSyntaxError
+from fba.errors import FbaError, InputFileError, MeshError, OutputFileError, TextSyntaxError
 from fba.mesh import Material, PolyMesh
 from fba.scene import FaceScene, Frame, Shape, Transform
 from formats.obj import ObjDocument, read, write
@@ -199,6 +199,18 @@ def test_materials_come_from_the_library_beside_and_go_back(tmp_path: Path) -> N
     again = read(tmp_path / "out.obj")
     assert again.shapes[0].materials == (skin,)
     assert again.shapes[0].mesh.face_materials.tolist() == [-1, 0]
+
+
+def test_a_library_stays_as_it_was_when_the_mesh_cannot_be_written(tmp_path: Path) -> None:
+    mesh = PolyMesh.from_faces(np.eye(3), [[0, 1, 2]])
+    mesh = replace(mesh, face_materials=np.zeros(1, dtype=np.int32))
+    scene = FaceScene((Shape("face", mesh, materials=(Material("skin"),)),))
+    (tmp_path / "head.obj").mkdir()
+    (tmp_path / "head.mtl").write_text("precious")
+    with pytest.raises(OutputFileError, match=r"head\.obj"):
+        write(scene, tmp_path / "head.obj")
+    assert (tmp_path / "head.mtl").read_text() == "precious"
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_several_shapes_of_another_format_become_objects(tmp_path: Path) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import resource
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +26,7 @@ from formats.usd import read_shape_set
 from samples import sample
 from studio.cli.app import app
 from studio.cli.arguments import parse_faps
+from studio.cli.console import print_json
 from studio.cli.outcome import Outcome
 
 VERBS = ("demo", "inspect", "clone", "export", "play", "check", "doctor")
@@ -73,7 +76,7 @@ def test_unknown_words_are_a_usage_error() -> None:
 
 def test_fap_lists() -> None:
     assert parse_faps("3,12-14,open_jaw,19") == (3, 12, 13, 14, 19)
-    for wrong in ("0", "69", "jaw_open", "5-", "3;4"):
+    for wrong in ("0", "69", "jaw_open", "5-", "3;4", "", ",", "20-3"):
         with pytest.raises(ValueError, match=r"FAP"):
             parse_faps(wrong)
 
@@ -331,6 +334,111 @@ def test_a_full_disk_leaves_the_old_file(cloned: Path, tmp_path: Path, name: str
     assert name in done.stderr
     assert out.read_text() == "precious"
     assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("verb", [("inspect", "default"), ("inspect", "default", "--json"), ("doctor", "--json")])
+def test_a_reader_that_goes_away_ends_the_command_quietly(verb: tuple[str, ...]) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-m", "studio.cli", *verb], stdout=writing, stderr=subprocess.PIPE, check=False
+    )
+    os.close(writing)
+    assert done.returncode == Outcome.READER_GONE
+    assert done.stderr == b""
+
+
+def test_output_that_standard_output_cannot_take() -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "studio.cli", "inspect", "default"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == Outcome.BAD_INPUT
+    assert done.stderr.startswith("fba: error: standard output: ")
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("delay", [0.05, 0.9])
+def test_an_interrupt_ends_quietly_and_leaves_nothing(tmp_path: Path, delay: float) -> None:
+    # The interpreter's own start-up is over when this line appears; the packages are still to be loaded.
+    code = "import sys; from studio.cli import main; print('here', flush=True); main()"
+    words = ["clone", str(sample("faces/quad_head.obj")), "-o", str(tmp_path / "o.wrl")]
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        time.sleep(delay)
+        process.send_signal(signal.SIGINT)
+        said = process.stderr.read()
+    assert process.returncode == Outcome.INTERRUPTED
+    assert said == "fba: interrupted\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_brackets_in_names_are_printed_as_they_are(cloned: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "a["
+    folder.mkdir()
+    out = folder / "b]c [i] [" / "red].obj"
+    out.parent.mkdir()
+    result = fba("export", cloned, "-o", out)
+    assert result.exit_code == 0, result.output
+    assert str(out) in result.stdout
+    assert str(out) in fba("inspect", out).stdout
+
+
+def test_json_has_no_numbers_that_json_does_not_know(capsys: pytest.CaptureFixture[str]) -> None:
+    print_json({"a": [float("nan"), (float("inf"), 1.5)]})
+    assert json.loads(capsys.readouterr().out) == {"a": [None, [None, 1.5]]}
+
+
+def test_faps_that_the_source_cannot_give(tmp_path: Path) -> None:
+    result = fba("clone", sample("faces/tri_head.obj"), "-o", tmp_path / "o.wrl", "--faps", "62-68")
+    refused(result, "no motion of these FAPs")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_outputs_that_would_harm_each_other_are_refused_first(tmp_path: Path) -> None:
+    head = sample("faces/tri_head.obj")
+    before = head.read_bytes()
+    for words in (("--report", head), ("--sheet", tmp_path / "s.jpg"), ("--report", tmp_path / "o.wrl")):
+        assert fba("clone", head, "-o", tmp_path / "o.wrl", *words).exit_code == Outcome.USAGE
+    assert head.read_bytes() == before
+    refused(fba("clone", head, "-o", tmp_path / "none" / "o.wrl"), "cannot write", "folder")
+    assert fba("clone", head, "-o", tmp_path / "o.wrl", "--shapes", tmp_path).exit_code == Outcome.USAGE
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_face_is_not_exported(cloned: Path, tmp_path: Path) -> None:
+    good = tmp_path / "good.usda"
+    assert fba("export", cloned, "-o", good).exit_code == 0
+    text = good.read_text()
+    place = re.search(r"int\[\] pointIndices = \[(\d+)", text)
+    assert place is not None
+    bad = tmp_path / "bad.usda"
+    bad.write_text(text[: place.start(1)] + "9999999" + text[place.end(1) :])
+    refused(fba("export", bad, "-o", tmp_path / "o.wrl"), "bad.usda", "coordIndex")
+    assert fba("check", bad).exit_code == Outcome.FINDINGS
+    assert not (tmp_path / "o.wrl").exists()
+
+
+def test_textures_that_do_not_come_along_are_named(tmp_path: Path) -> None:
+    head = tmp_path / "head.wrl"
+    head.write_text(
+        '#VRML V2.0 utf8\nShape { appearance Appearance { texture ImageTexture { url "skin.png" } } geometry '
+        "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 0 1 0 ] } coordIndex [ 0 1 2 ] } }\n"
+    )
+    assert "skin.png is not there" in fba("inspect", head).stdout
+    (tmp_path / "skin.png").touch()
+    assert "is not there" not in fba("inspect", head).stdout
+    (tmp_path / "new").mkdir()
+    assert "copy the texture skin.png" in fba("export", head, "-o", tmp_path / "new" / "head.usda").stdout
+    assert "copy" not in fba("export", head, "-o", tmp_path / "head.usda").stdout
 
 
 def test_the_word_default_names_the_shipped_source() -> None:
