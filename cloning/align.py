@@ -30,6 +30,9 @@ def radial_warp(places: Floats, anchors: Floats, goals: Floats) -> Floats:
     (n, d) moved points.
     """
     k, d = anchors.shape
+    # About their own middle: far from the origin the affine part would drown the rest of the system.
+    middle = anchors.mean(axis=0)
+    anchors, places = anchors - middle, places - middle
     kernel = np.linalg.norm(anchors[:, None] - anchors[None], axis=2)
     affine = np.concatenate([np.ones((k, 1)), anchors], axis=1)
     system = np.zeros((k + d + 1, k + d + 1))

@@ -30,7 +30,7 @@ _INT32 = 2**31
 _Line = tuple[int, str]
 
 
-def read_fap(path: Path) -> tuple[FapStream, list[Finding]]:
+def read_fap(path: str | Path) -> tuple[FapStream, list[Finding]]:
     """Read a .fap file.
 
     Returns
@@ -60,7 +60,7 @@ def parse_fap(data: bytes, source: str = "stream") -> tuple[FapStream, list[Find
     return _Reader(source).read(data)
 
 
-def write_fap(stream: FapStream, path: Path) -> None:
+def write_fap(stream: FapStream, path: str | Path) -> None:
     """Write a .fap file atomically; `read_fap` gives back the same stream.
 
     Raises

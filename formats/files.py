@@ -11,7 +11,7 @@ from pathlib import Path
 from fba.errors import InputFileError, OutputFileError
 
 
-def read_bytes(path: Path, limit: int = 2 << 30) -> bytes:
+def read_bytes(path: str | Path, limit: int = 2 << 30) -> bytes:
     """Read a whole file.
 
     Raises
@@ -19,6 +19,7 @@ def read_bytes(path: Path, limit: int = 2 << 30) -> bytes:
     InputFileError
         If it is missing, a folder, unreadable, empty, or larger than `limit` bytes.
     """
+    path = Path(path)
     try:
         size = path.stat().st_size
         if path.is_dir():
@@ -48,7 +49,7 @@ def require_folder(path: Path) -> None:
 
 
 @contextmanager
-def atomic_output(path: Path) -> Iterator[Path]:
+def atomic_output(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside `path` (same extension); rename it onto `path` when the block succeeds.
 
     Raises
@@ -57,7 +58,8 @@ def atomic_output(path: Path) -> Iterator[Path]:
         If the folder does not exist or cannot be written, or the disk is full. What stood at `path` before
         is untouched then.
     """
-    folder = path.parent if str(path.parent) else Path()
+    path = Path(path)
+    folder = path.parent
     if path.is_dir():
         raise OutputFileError(f"cannot write {path}: a folder of that name exists")
     try:
@@ -80,7 +82,7 @@ def atomic_output(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def write_bytes(path: Path, data: bytes) -> None:
+def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a whole file atomically; see `atomic_output`."""
     with atomic_output(path) as temporary:
         temporary.write_bytes(data)

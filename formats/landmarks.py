@@ -39,7 +39,7 @@ _WEIGHT_TOLERANCE = 1e-3
 """How far weights may be from adding up to 1, or below 0: the rounding of a file with three decimals."""
 
 
-def landmarks_beside(path: Path) -> Path | None:
+def landmarks_beside(path: str | Path) -> Path | None:
     """Return NAME.fps.json beside NAME.obj (NAME.wrl.gz, ...) when it exists."""
     path = Path(path)
     name = path.name[:-3] if path.name.lower().endswith(".gz") else path.name
@@ -47,7 +47,7 @@ def landmarks_beside(path: Path) -> Path | None:
     return beside if beside.is_file() else None
 
 
-def read_landmarks(path: Path, scene: FaceScene) -> FeaturePoints:
+def read_landmarks(path: str | Path, scene: FaceScene) -> FeaturePoints:
     """Read a landmark file for a scene.
 
     Raises
@@ -75,7 +75,7 @@ def read_landmarks(path: Path, scene: FaceScene) -> FeaturePoints:
     return FeaturePoints(points)
 
 
-def write_landmarks(points: FeaturePoints, scene: FaceScene, path: Path) -> None:
+def write_landmarks(points: FeaturePoints, scene: FaceScene, path: str | Path) -> None:
     """Write feature points; what is written reads back as the same places on the same file's mesh.
 
     Raises

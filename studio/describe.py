@@ -18,6 +18,7 @@ from fba.mesh import PolyMesh
 from fba.neutral import check_neutral
 from fba.scene import FaceScene, Shape
 from fba.stream import FapStream
+from formats.gltf import GltfDocument
 
 
 def describe_mesh(mesh: PolyMesh) -> dict[str, object]:
@@ -48,10 +49,19 @@ def describe_scene(scene: FaceScene) -> dict[str, object]:
         "vertices": scene.vertex_count,
         "shapes": [_describe_shape(shape) for shape in scene.shapes],
         "transforms": [transform.name for transform in scene.transforms],
+        "morph_targets": morph_targets(scene),
         "meters_per_unit": scene.meters_per_unit,
         "axes_turned": not scene.frame.identity,
         "winding_reversed": scene.frame.reversed_winding,
     }
+
+
+def morph_targets(scene: FaceScene) -> list[str]:
+    """Names of the morph targets that a glTF file holds beside the neutral mesh."""
+    document = scene.document
+    if not isinstance(document, GltfDocument):
+        return []
+    return list(dict.fromkeys(name for targets in document.targets.values() for name in targets))
 
 
 def _describe_shape(shape: Shape) -> dict[str, object]:

@@ -90,6 +90,9 @@ def _print(about: dict[str, Any], out: Any) -> None:
         for s in about["shapes"]
     ]
     table("", ("shape", "role", ">vertices", "polygons", ">parts", ">border edges", "texture"), rows, out)
+    if about["morph_targets"]:
+        names = about["morph_targets"]
+        out.print(f"{len(names)} morph targets: {', '.join(names[:6])}{', ...' if len(names) > 6 else ''}")
     if about.get("fapu"):
         out.print("FAPUs: " + ", ".join(f"{k} {v:.4g}" for k, v in about["fapu"].items()))
     if "feature_points" in about:

@@ -236,3 +236,9 @@ def test_damaged_files_only_raise_the_toolkits_errors(edits: list[tuple[int, byt
         return
     assert len(stream) > 0
     assert all(f.message for f in findings)
+
+
+def test_a_path_may_be_plain_text(tmp_path: Path) -> None:
+    path = str(tmp_path / "s.fap")
+    write_fap(FapStream.build(25.0, 1, {3: [7]}), path)
+    assert read_fap(path)[0].values[0, 2] == 7

@@ -120,6 +120,12 @@ def test_inspect_a_plain_mesh_and_a_stream() -> None:
     assert json.loads(fba("inspect", sample("streams/demo.fap"), "--json").stdout)["frames"] > 50
 
 
+def test_inspect_names_the_morph_targets_of_a_gltf(shared: Path) -> None:
+    path = shared / "faces" / "rpm-brunette" / "brunette-t.glb"
+    assert len(json.loads(fba("inspect", path, "--json").stdout)["morph_targets"]) == 67
+    assert "67 morph targets: " in fba("inspect", path).stdout
+
+
 def test_play_writes_vertices_in_the_files_own_order(cloned: Path, tmp_path: Path) -> None:
     out = tmp_path / "played.npz"
     assert fba("play", cloned, "demo", "-o", out).exit_code == 0
