@@ -14,11 +14,11 @@ from cloning.normalize import TONGUE, factors
 from cloning.parts import LOWER_TEETH, PUPILS, eye_center
 from cloning.prepare import PreparedFace
 from cloning.rigid import fit_rigid
-from cloning.spheres import fit_sphere
 from cloning.surface import polygon_edges
 from fba.arrays import Floats, Ints
 from fba.faps import Unit
 from fba.scene import Role
+from fba.sphere import fit_sphere
 
 RIGID = 0.02
 """A body whose motion is rigid up to this share of its size is carried as a rotation and a translation alone."""

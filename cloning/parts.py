@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cloning.spheres import fit_sphere
 from cloning.surface import seam_links
 from fba.arrays import Floats, Ints
 from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.findings import Finding
 from fba.scene import FaceScene, Node, Role, Shape, Transform
+from fba.sphere import fit_sphere
 
 PUPILS = {"3.5": Role.EYE_LEFT, "3.6": Role.EYE_RIGHT}
 UPPER_TEETH = ("9.8", "9.10")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,9 @@ BURIED = 0.01
 
 STIFF = 100.0
 """How much a difference between neighbours counts against a vertex's own way."""
+
+FIRMER = 1e3
+"""Weight of a vertex's own place at REACH from the rim; 1 at the rim."""
 
 FIXED = 1e6
 """Weight of what must stay: feature points."""
@@ -71,7 +75,8 @@ class Lid:
     rest : (m, 3) where they rest, in eye separations.
     clear : (m,) clearance from the eyeball at rest, in radii.
     span : (s,) x of the slices.
-    compliance : (m, m) how far each vertex follows a push at another one; 0 at feature points.
+    skin : factorized stiffness (m, m): soft at the rim, smooth, fixed at feature points.
+    points : (k, m) evaluates the feature points that lie on these vertices.
     """
 
     side: int
@@ -80,7 +85,8 @@ class Lid:
     rest: Floats
     clear: Floats
     span: Floats
-    compliance: Floats
+    skin: Any
+    points: Floats
 
     def rim(self, places: Floats) -> tuple[Floats, Ints, Floats]:
         """Find the rim of the displaced lid.
@@ -128,11 +134,16 @@ class Lid:
             if not rows.any():
                 break
             (a, b), t = edges[rows].T, shares[rows]
-            follow = self.compliance[:, a] * (1.0 - t) + self.compliance[:, b] * t
+            pushes = np.zeros((len(places), len(t)))
+            column = np.arange(len(t))
+            pushes[a, column] += 1.0 - t
+            pushes[b, column] += t
+            follow = self.skin.solve(pushes)
             between = follow[a] * (1.0 - t)[:, None] + follow[b] * t[:, None]
             between[np.diag_indices(len(t))] += FIRM * float(np.trace(between)) / len(t)
             lifted += follow @ np.linalg.solve(between, missing[rows])
             lifted = np.clip(lifted, -most, most)
+            lifted -= np.linalg.lstsq(self.points, self.points @ lifted, rcond=1e-9)[0]
         return lifted
 
 
@@ -167,9 +178,12 @@ class Eye:
         lid = self.lids[part]
         now = lid.rim(lid.rest + offsets[lid.vertices])[0]
         used = self.open & np.isfinite(now)
+        if not used.any():
+            return np.zeros(len(now))
         row = np.arange(len(now))
         share = (now[used] - self.heights[part, used]) / (self.heights[1 - part, used] - self.heights[part, used])
-        return np.interp(row, row[used], share)
+        travel: Floats = np.interp(row, row[used], share)
+        return travel
 
     def follow(self, part: int, offsets: Floats, travel: Floats, spare: float) -> Floats:
         """Offsets (m,) along y that bring a rim a share of the way to the other one.
@@ -235,7 +249,7 @@ def _lid(surface: Surface, clear: Floats, vertices: Ints, guide: Floats, side: i
     line = a + shares[found, None] * (b - a)
     if not len(line):
         return None
-    away = np.linalg.norm(lid.rest[:, None] - line[None], axis=2).min(axis=1)
+    away: Floats = np.linalg.norm(lid.rest[:, None] - line[None], axis=2).min(axis=1)
     kept = away < REACH
     return _assemble(surface, clear, lid.vertices[kept], span, side, away[kept])
 
@@ -248,22 +262,23 @@ def _assemble(surface: Surface, clear: Floats, vertices: Ints, span: Floats, sid
     edges = edges[(edges >= 0).all(axis=1)]
     if len(edges) < 3:
         return None
-    compliance = _compliance(surface, vertices, edges, away) if len(away) else np.zeros((0, 0))
-    return Lid(side, vertices, edges, surface.vertices[vertices], clear[vertices], span, compliance)
-
-
-def _compliance(surface: Surface, vertices: Ints, edges: Ints, away: Floats) -> Floats:
-    """Inverse stiffness of a lid that is soft at its rim, firm at REACH, smooth, and fixed at feature points."""
-    stiffness = np.diag(1.0 + 1e3 * (away / REACH) ** 4)
-    a, b = edges.T
-    np.add.at(stiffness, (a, a), STIFF)
-    np.add.at(stiffness, (b, b), STIFF)
-    np.add.at(stiffness, (a, b), -STIFF)
-    np.add.at(stiffness, (b, a), -STIFF)
     points = surface.point_matrix(list(surface.points))[:, vertices].toarray()
-    stiffness += FIXED * points.T @ points
-    found: Floats = np.linalg.inv(stiffness)
-    return found
+    points = points[np.any(points > 0.0, axis=1)]
+    skin = _stiffness(points, edges, away) if len(away) else None
+    return Lid(side, vertices, edges, surface.vertices[vertices], clear[vertices], span, skin, points)
+
+
+def _stiffness(points: Floats, edges: Ints, away: Floats) -> Any:
+    """Factorized stiffness of a lid that is soft at its rim, firm at REACH, smooth, and fixed at feature points."""
+    from scipy.sparse import coo_array, csc_array, diags_array
+    from scipy.sparse.linalg import splu
+
+    m, (a, b) = len(away), edges.T
+    links = coo_array((np.full(len(a), STIFF), (a, b)), shape=(m, m))
+    links = links + links.T
+    fixed = csc_array(points)
+    own = diags_array(links.sum(axis=1) + 1.0 + FIRMER * (away / REACH) ** 4)
+    return splu(csc_array(own - links + FIXED * (fixed.T @ fixed)))
 
 
 def _away(places: Floats, guide: Floats) -> Floats:
@@ -306,5 +321,4 @@ class RimFollower:
 
 def rim_follower(source: PreparedFace, target: PreparedFace) -> RimFollower:
     """The follower of a pair of faces."""
-    found = (eyes(face) for face in (source, target))
-    return RimFollower(*found, (source.fapu.es0, target.fapu.es0))
+    return RimFollower(eyes(source), eyes(target), (source.fapu.es0, target.fapu.es0))

@@ -15,7 +15,6 @@ from cloning.normalize import blend, units_of
 from cloning.published import inside_polygon
 from cloning.refine import refine
 from cloning.rigid import fit_rigid
-from cloning.spheres import fit_sphere
 from fba import PolyMesh
 from fba.scene import rotation_matrix
 
@@ -161,17 +160,6 @@ def test_rigid_fit_finds_rotation_and_path() -> None:
     assert np.allclose(motion.offsets(vertices, center, np.ones(3))[:, 0], offsets)
     small = motion.offsets(0.5 * vertices, 0.5 * center, np.full(3, 0.5))[:, 0]
     assert np.allclose(small, 0.5 * offsets), "a body half as large moves half as far and turns as far"
-
-
-def test_sphere_fit_of_a_cap() -> None:
-    random = np.random.default_rng(6)
-    way = random.normal(size=(200, 3))
-    way[:, 2] = np.abs(way[:, 2])
-    cap = 0.7 * way / np.linalg.norm(way, axis=1, keepdims=True) + [1.0, 2.0, 3.0]
-    center, radius, error = fit_sphere(cap)
-    assert np.allclose(center, [1.0, 2.0, 3.0])
-    assert radius == pytest.approx(0.7)
-    assert error < 1e-9
 
 
 def test_filter_stays_within_support_and_label() -> None:
