@@ -154,7 +154,7 @@ TONGUE_UP = "tongueUp"
 """Name of a pose's own unit beside MakeHuman's."""
 TIP_LIFT = 0.2
 """Height of the tongue's tip in that unit, in ES0."""
-LID_STEP = 128
+LID_STEP = 256
 """Between the borders of a closing lid: the chord of each step stays within 0.4 % of the eyeball's radius."""
 STEEPEST = 0.4
 """Squared cosine between a direction and the surface below which skin no longer slides the whole way."""
