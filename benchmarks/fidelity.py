@@ -58,7 +58,7 @@ def main() -> None:
     shapes = source.shapes()
     prepared = prepare(source.scene, source.points, "source")
     rows = []
-    print(f"{'target':14}{'mode':12}" + "".join(f"{name:>11}" for name in HEADINGS))
+    print(f"{'target':18}{'mode':12}" + "".join(f"{name:>11}" for name in HEADINGS))
     print_row("source", "itself", own_measures(prepared, shapes))
     for target in targets(makehuman, options.faces):
         for as_published in (False, True):
@@ -117,7 +117,7 @@ HEADINGS = ("fp_before", "fp_after", "truth", "truth_hid", "lid", "lid_worst", "
 
 def print_row(target: str, mode: str, row: dict[str, float]) -> None:
     cells = "".join(f"{row[h]:11.4f}" if h in row else f"{'-':>11}" for h in HEADINGS)
-    print(f"{target:14}{mode:12}{cells}")
+    print(f"{target:18}{mode:12}{cells}")
 
 
 def own_measures(face: PreparedFace, shapes: ShapeSet) -> dict[str, float]:

@@ -13,8 +13,9 @@ from samples.build.contact import LIDS, LIPS, edge_line, side_mask
 from samples.build.geodesic import smoothstep
 from samples.build.head import Head
 
-LIP_GAP = 2.0 / 1024.0
-"""Gap left between the lips, in MNS0: contact to the eye, but no two vertices fall together."""
+LIP_GAP = -2.0 / 1024.0
+"""Gap between the lips, in MNS0: they overlap by a hair (.04 mm), so that no light falls through
+where the edges of two lips with different vertices meet."""
 LIP_REACH = 0.17
 """How far from the line of contact a lip follows the correction, in ES0."""
 PASSES = 6
