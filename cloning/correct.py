@@ -58,7 +58,7 @@ class Correction:
     bumps: Any
     evaluate: Any
 
-    def apply(self, motion: Floats, goals: Floats) -> tuple[Floats, Floats]:
+    def apply(self, motion: Floats, goals: Floats) -> Floats:
         """Add the bumps to a motion, in place.
 
         Parameters
@@ -68,13 +68,14 @@ class Correction:
 
         Returns
         -------
-        before, after : (k, K, 3) what the feature points miss.
+        (k, K, 3) what the feature points still miss.
         """
         before = goals - self._at_points(motion)
         active = self._activity(motion, goals)
         self._add(self.wide, SOFT, before, active, motion)
         self._add(self.bumps, EXACT, goals - self._at_points(motion), active, motion)
-        return before, goals - self._at_points(motion)
+        left: Floats = goals - self._at_points(motion)
+        return left
 
     def _at_points(self, motion: Floats) -> Floats:
         at: Floats = (self.evaluate @ motion.reshape(len(motion), -1)).reshape(-1, *motion.shape[1:])

@@ -32,19 +32,38 @@ Offsets = Mapping[str, Floats]
 
 @dataclass
 class Tally:
-    """Sums of what feature points miss, over all motions."""
+    """Sums of what feature points miss, over all motions.
+
+    Attributes
+    ----------
+    before, after : of the bare transfer, and of the finished skin; largest : the most that the latter misses.
+    left : feature point -> the most that the correction leaves, in eye separations.
+    """
 
     before: float = 0.0
     after: float = 0.0
     wanted: float = 0.0
-    worst: dict[str, float] = field(default_factory=dict)
+    largest: float = 0.0
+    left: dict[str, float] = field(default_factory=dict)
+
+    def add(self, wanted: Floats, before: Floats, after: Floats, es0: float) -> None:
+        """Count some motions; arrays (k, K, 3) and the eye separation in the same unit."""
+        self.largest = max(self.largest, float(np.abs(after).max(initial=0.0)) / es0)
+        self.before += float(np.abs(before).sum())
+        self.after += float(np.abs(after).sum())
+        self.wanted += float(np.abs(wanted).sum())
+
+    def note_left(self, ids: Sequence[str], left: Floats) -> None:
+        """Keep the largest of what the correction leaves, (k, K, 3), for each feature point."""
+        for key, missed in zip(ids, np.abs(left).max(axis=(1, 2)), strict=True):
+            self.left[key] = max(self.left.get(key, 0.0), float(missed))
 
     def measures(self) -> dict[str, float]:
         total = max(self.wanted, 1e-300)
         return {
             "fp_error_before": self.before / total,
             "fp_error_after": self.after / total,
-            "fp_error_worst_es": max(self.worst.values(), default=0.0),
+            "fp_error_worst_es": self.largest,
         }
 
 
@@ -92,11 +111,11 @@ class FaceTransfer:
 
     def inexact(self) -> list[Finding]:
         """Say which feature points could not be made exact, after `apply`."""
-        names = [key for key, missed in self.tally.worst.items() if missed > MISSED]
+        names = [key for key, missed in self.tally.left.items() if missed > MISSED]
         if self.correction is None or not names:
             return []
         text = (
-            f"feature points {', '.join(names)} miss their motion by up to {max(self.tally.worst.values()):.2f} eye "
+            f"feature points {', '.join(names)} miss their motion by up to {max(self.tally.left.values()):.2f} eye "
             "separations: on this coarse mesh they share triangles with others that move differently"
         )
         return [Finding("warning", "inexact-points", text, self.target.scene.name)]
@@ -104,11 +123,15 @@ class FaceTransfer:
     def _chunk(self, motions: Sequence[Offsets]) -> list[dict[str, Floats]]:
         moving = np.stack([self.source.skin.join(m) for m in motions], axis=1)
         skin = self.skin.apply(moving)
-        self._correct(moving, skin)
+        wanted = self._wanted(moving)
+        before = wanted - self._at_points(skin)
+        if self.correction is not None:
+            self.tally.note_left(self.ids, self.correction.apply(skin, wanted) / self.target.fapu.es0)
         if self.rims is not None:
             self.rims.apply(moving, skin)
         if self.guard is not None:
             self.guard.apply(moving, skin)
+        self.tally.add(wanted, before, wanted - self._at_points(skin), self.target.fapu.es0)
         done: dict[str, Floats] = dict(self.target.skin.split(skin))
         for mine, yours, mover in self.bodies:
             offsets = mine.join(motions)
@@ -121,24 +144,17 @@ class FaceTransfer:
             out.append({n: np.ascontiguousarray(v[:, k]) for n, v in done.items() if np.any(v[:, k])})
         return out
 
-    def _correct(self, moving: Floats, skin: Floats) -> None:
-        """Measure the feature points and, if wanted, make them exact (in place)."""
-        if not self.ids:
-            return
-        count = moving.shape[1]
+    def _wanted(self, moving: Floats) -> Floats:
+        """(k, K, 3) offsets that the feature points shall have: the source's, scaled by the FAPUs."""
         rows = self.source.skin.point_matrix(self.ids)
-        wanted = (rows @ moving.reshape(len(moving), -1)).reshape(len(self.ids), count, 3)
-        wanted = wanted * ratios(self.source.fapu, self.target.fapu, self.ids)[:, None]
-        if self.correction is not None:
-            before, after = self.correction.apply(skin, wanted)
-        else:
-            here = self.target.skin.point_matrix(self.ids) @ skin.reshape(len(skin), -1)
-            before = after = wanted - here.reshape(wanted.shape)
-        self.tally.before += float(np.abs(before).sum())
-        self.tally.after += float(np.abs(after).sum())
-        self.tally.wanted += float(np.abs(wanted).sum())
-        for key, missed in zip(self.ids, np.abs(after).max(axis=(1, 2)) / self.target.fapu.es0, strict=True):
-            self.tally.worst[key] = max(self.tally.worst.get(key, 0.0), float(missed))
+        found = (rows @ moving.reshape(len(moving), -1)).reshape(len(self.ids), moving.shape[1], 3)
+        scaled: Floats = found * ratios(self.source.fapu, self.target.fapu, self.ids)[:, None]
+        return scaled
+
+    def _at_points(self, skin: Floats) -> Floats:
+        rows = self.target.skin.point_matrix(self.ids)
+        found: Floats = (rows @ skin.reshape(len(skin), -1)).reshape(len(self.ids), skin.shape[1], 3)
+        return found
 
 
 def build_face_transfer(
