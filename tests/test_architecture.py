@@ -16,8 +16,9 @@ ALLOWED = {
     "samples": {"fba"},
     "fat": {"fba"},
     "cloning": {"fba", "fat"},
+    "authoring": {"fba", "fat", "cloning"},
     "formats": {"fba", "fat", "samples"},
-    "studio": {"fba", "fat", "cloning", "formats", "samples"},
+    "studio": {"fba", "fat", "cloning", "authoring", "formats", "samples"},
 }
 MODULES = {
     ".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): p
