@@ -1,8 +1,11 @@
-"""Play Facial Animation Tables: from FAP values to vertices, exactly by the equations of ISO/IEC 14496-1."""
+"""Play Facial Animation Tables: from FAP values to vertices, by the equations of ISO/IEC 14496-1.
+
+FAPs that fight when summed are shared first, by the rules of `fat.combine`; without rules the sum is the standard's.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -11,6 +14,7 @@ import numpy as np
 
 from fat.build import check_indices
 from fat.chains import Chains
+from fat.combine import Combination
 from fat.deform import Column, Deformer
 from fat.face import AnimatableFace
 from fat.intervals import IntervalRule, interval_rule
@@ -62,12 +66,16 @@ class Player:
     face : the animatable face.
     high_level : what a viseme or expression and low-level FAPs do together. "add": their displacements add.
         "high_only": a frame with a viseme or expression leaves out its low-level FAPs.
+    rules : how FAPs that fight are combined, names out of `fat.combine.RULES`; None for all rules, an empty
+        collection for the standard's plain sum. A low-level FAP that comes alone is the same either way.
 
     Raises
     ------
     FaceDefTablesError
         If a table speaks of a FAP, shape, vertex or Transform that is not there, or holds displacements that are
         not finite numbers.
+    FapStreamError
+        If a rule is unknown.
 
     Notes
     -----
@@ -76,7 +84,9 @@ class Player:
     expression's table its intensity, both with the unit 1. A FAP without a table has no effect.
     """
 
-    def __init__(self, face: AnimatableFace, high_level: HighLevel = "add") -> None:
+    def __init__(
+        self, face: AnimatableFace, high_level: HighLevel = "add", rules: Collection[str] | None = None
+    ) -> None:
         self.face = face
         self.high_level = high_level
         self._tables = tuple(face.tables)
@@ -84,6 +94,7 @@ class Player:
         self._order = face.scene.file_order()
         self._chains = Chains(face.scene, self._tables)
         self._plan = _Plan(face, self._tables)
+        self._combination = Combination(face, rules)
 
     def pose(
         self,
@@ -164,7 +175,7 @@ class Player:
     def _choose(self, values: Floats, high_level_present: Bools) -> Floats:
         if self.high_level == "high_only":
             values[np.ix_(high_level_present, self._low)] = 0.0
-        return values
+        return self._combination(values)
 
     @cached_property
     def _local_deformer(self) -> Deformer:

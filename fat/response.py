@@ -1,0 +1,91 @@
+"""How far each table moves feature points: small enough to ask at every frame of a stream."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from fat.face import AnimatableFace
+from fat.intervals import IntervalRule, interval_rule
+from fba.arrays import Bools, Floats, Ints
+from fba.faps import fap
+
+Probe = Mapping[str, tuple[float, float, float]]
+"""Feature point -> direction (3,): a probe measures the sum of the points' motions along these directions."""
+
+
+class Response:
+    """What the tables of a face do to some probes, exactly as in evaluation and without its vertices.
+
+    Parameters
+    ----------
+    face : animatable face; FaceDefTransforms are left out, as they turn whole parts.
+    probes : P sums of feature point motions; points that are not on a surface count as still.
+
+    Notes
+    -----
+    A feature point is a weighted sum of vertices, so that its motion is piecewise linear in every FAP like theirs.
+    """
+
+    def __init__(self, face: AnimatableFace, probes: Sequence[Probe]) -> None:
+        self._count = len(probes)
+        effect = _effects(face, probes)
+        seen: dict[str, Bools] = {name: np.asarray(part.any(axis=(1, 2))) for name, part in effect.items()}
+        rules: list[IntervalRule] = []
+        table_of: list[int] = []
+        self._rows: list[slice] = []
+        slopes: list[Floats] = []
+        self.borders: list[Floats] = []
+        """For each table the finite FAP values at which its response may bend."""
+        for number, table in enumerate(face.tables):
+            bends: set[float] = set()
+            start = len(table_of)
+            for mesh in table.meshes:
+                if mesh.shape not in effect:
+                    continue
+                (moving,) = np.nonzero(seen[mesh.shape][mesh.coord_index])
+                local = effect[mesh.shape][mesh.coord_index[moving]]
+                moved = np.einsum("kjc,kcp->jp", mesh.displacements[moving], local)
+                if not moved.any():
+                    continue
+                rules.append(interval_rule(mesh.interval_borders))
+                slopes.append(moved * face.fapu.unit(fap(table.fap_id).unit))
+                table_of += [number] * len(moved)
+                bends.update(mesh.interval_borders.tolist())
+            self._rows.append(slice(start, len(table_of)))
+            self.borders.append(np.array(sorted(bends), dtype=np.float64))
+        self._table_of: Ints = np.array(table_of, dtype=np.int32)
+        self._low, self._high, self._origin, self._sign = (
+            np.concatenate([np.zeros(0), *(getattr(r, part) for r in rules)])
+            for part in ("low", "high", "origin", "sign")
+        )
+        self._slopes: Floats = np.concatenate([np.zeros((0, self._count)), *slopes])
+
+    def __call__(self, values: Floats) -> Floats:
+        """Return the probes (f, P), in units of the mesh, at table values (f, tables)."""
+        clipped = np.clip(values[:, self._table_of], self._low, self._high)
+        moved: Floats = (self._sign * (clipped - self._origin)) @ self._slopes
+        return moved
+
+    def of(self, table: int, values: Floats) -> Floats:
+        """Return the probes (..., P) that one table moves at values (...)."""
+        own = self._rows[table]
+        clipped = np.clip(values[..., None], self._low[own], self._high[own])
+        moved: Floats = (self._sign[own] * (clipped - self._origin[own])) @ self._slopes[own]
+        return moved
+
+
+def _effects(face: AnimatableFace, probes: Sequence[Probe]) -> dict[str, Floats]:
+    """Shape -> (n, 3, P): how much each probe grows when a vertex moves by one unit of its local axes."""
+    counts = {s.name: s.mesh.vertex_count for s in face.scene.shapes}
+    found: dict[str, Floats] = {}
+    for number, probe in enumerate(probes):
+        for key, direction in probe.items():
+            point = face.feature_points.get(key)
+            if point is None or point.shape is None or point.shape not in counts:
+                continue
+            local = np.asarray(direction) @ face.scene.world_matrix(point.shape)[:3, :3]
+            effect = found.setdefault(point.shape, np.zeros((counts[point.shape], 3, len(probes))))
+            np.add.at(effect[:, :, number], list(point.vertices), np.outer(point.weights, local))
+    return found
