@@ -86,7 +86,7 @@ def conformance(face: AnimatableFace) -> list[FapConformance]:
         If the tables cannot be played.
     """
     player = Player(face)
-    probe = _Probe(face, player.pose().world_shapes())
+    probe = Probe(face, player.pose().world_shapes())
     results = []
     for table in face.tables:
         if table.fap_id not in LOW_LEVEL_FAPS:
@@ -109,8 +109,13 @@ def _values(table: FaceDefTable, definition: Fap) -> list[int]:
     return sorted(borders or set(definition.i_range) - {0})
 
 
-class _Probe:
-    """Measures motions against the neutral face."""
+class Probe:
+    """Measures the own motion of FAPs against the neutral face.
+
+    Parameters
+    ----------
+    neutral : shape name -> (n, 3) world vertices of the neutral face.
+    """
 
     def __init__(self, face: AnimatableFace, neutral: _World) -> None:
         self._face = face

@@ -13,6 +13,7 @@ from fat.build import face_motions
 from fat.conformance import FapConformance, conformance
 from fat.evaluate import Player
 from fat.face import AnimatableFace
+from fat.fap_quality import FapQuality
 from fat.motion import FaceMotion
 from fat.quality import fap_error, fap_values, feature_point_motion, flips, lid_gap, lip_gap_change
 from fat.validate import validate
@@ -20,6 +21,7 @@ from fba.arrays import Floats
 from fba.faps import LOW_LEVEL_FAPS
 from fba.findings import Finding
 from fba.scene import Role
+from studio.fap_measuring import measure_faps
 
 FP_ERROR_MUST = 0.01
 """Largest mean relative error over all feature points of a motion."""
@@ -78,6 +80,9 @@ class CheckResult:
     """What `fba check` prints.
 
     unmeasured : low-level FAPs with a table, but without a feature point to measure them at.
+    quality : the measures of each FAP (both directions), viseme and expression.
+    source_quality : the same rows of the source, where it has them. A face that is checked by itself must keep every
+        limit; a clone inherits its source's flaws, so beside a source only what is worse there is told, as warnings.
     """
 
     findings: tuple[Finding, ...]
@@ -85,6 +90,23 @@ class CheckResult:
     faps: tuple[FapConformance, ...]
     unmeasured: tuple[str, ...]
     fidelity: Fidelity | None
+    quality: tuple[FapQuality, ...] = ()
+    source_quality: tuple[FapQuality, ...] | None = None
+
+    @cached_property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What is worth telling about the motions, but no reason to fail."""
+        out = []
+        for row, beside in self.compared:
+            out += row.remarks()
+            out += [] if beside is None else row.failures(beside)
+        return tuple(out)
+
+    @cached_property
+    def compared(self) -> tuple[tuple[FapQuality, FapQuality | None], ...]:
+        """Each row and the source's."""
+        theirs = {row.key: row for row in self.source_quality or ()}
+        return tuple((row, theirs.get(row.key)) for row in self.quality)
 
     @cached_property
     def problems(self) -> tuple[Finding, ...]:
@@ -96,6 +118,8 @@ class CheckResult:
             if not fap.passed:
                 text = f"{fap.name} at {fap.value} moves its feature point {fap.point} by {fap.found:.1f} FAP units"
                 out.append(Finding("error", "own-fp", text, f"FAP {fap.fap_id}"))
+        for row, beside in self.compared:
+            out += row.failures() if beside is None else []
         return (*out, *(self.fidelity.failures() if self.fidelity else ()))
 
     @property
@@ -107,9 +131,11 @@ class CheckResult:
         return {
             "passed": self.passed,
             "neutral_unchanged": self.neutral_unchanged,
-            "findings": [asdict(f) for f in (*self.problems, *self.findings)],
+            "findings": [asdict(f) for f in (*self.problems, *self.remarks, *self.findings)],
             "faps": [{**asdict(f), "relative_error": f.relative_error, "passed": f.passed} for f in self.faps],
             "unmeasured": list(self.unmeasured),
+            "quality": [row.to_dict() for row in self.quality],
+            "source_quality": None if self.source_quality is None else [row.to_dict() for row in self.source_quality],
             "fidelity": asdict(self.fidelity) if self.fidelity else None,
         }
 
@@ -135,7 +161,15 @@ def check_face(
     measured = tuple(conformance(face))
     seen = {fap.fap_id for fap in measured}
     unmeasured = tuple(t.name for t in face.tables if t.fap_id in LOW_LEVEL_FAPS and t.fap_id not in seen)
-    return CheckResult(findings, unchanged, measured, unmeasured, None if source is None else fidelity(face, source))
+    return CheckResult(
+        findings,
+        unchanged,
+        measured,
+        unmeasured,
+        None if source is None else fidelity(face, source),
+        tuple(measure_faps(face)),
+        None if source is None else tuple(measure_faps(source)),
+    )
 
 
 def fidelity(face: AnimatableFace, source: AnimatableFace) -> Fidelity | None:

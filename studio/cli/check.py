@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from studio.cli.arguments import AsJson, FacePath
 from studio.cli.outcome import Outcome
+
+if TYPE_CHECKING:
+    from fat.fap_quality import FapQuality
+    from studio.checking import CheckResult
+
+COLUMNS = (
+    ">FAP",
+    "name",
+    ">value",
+    ">own error",
+    ">cross-talk",
+    ">on FAP",
+    ">flips",
+    ">limit",
+    ">flips there",
+    ">stretch",
+    ">seams",
+    ">in eyes",
+    ">mirror",
+    "",
+)
 
 
 def check(
@@ -15,30 +36,66 @@ def check(
     source: Annotated[
         str | None, typer.Option(help="The face it was cloned from ('default'): compare every motion.")
     ] = None,
+    worst: Annotated[bool, typer.Option(help="Show the worst motions first.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Check conformance and quality; ends with 1 when something fails."""
+    """Check conformance and quality of every FAP, viseme and expression; ends with 1 when something fails."""
     from formats import read_face
     from studio.checking import check_face, check_file
-    from studio.cli.console import console, print_findings, print_json, table
+    from studio.cli.console import print_json
 
     result = check_face(read_face(str(face)), None if source is None else read_face(source), check_file(face))
     if as_json:
         print_json({"file": str(face), **result.to_dict()})
     else:
-        out = console()
-        rows = [
-            (str(f.fap_id), f.name, f.point, str(f.value), f"{f.found:.1f}", f"{100 * f.relative_error:.2f} %")
-            for f in result.faps
-        ]
-        if rows:
-            table("", (">FAP", "name", "point", ">value", ">moves", ">error"), rows, out)
-        if result.fidelity is not None:
-            for name, value in result.to_dict()["fidelity"].items():  # type: ignore[attr-defined]
-                out.print(f"{name}: {value:.4g}" if isinstance(value, float) else f"{name}: {value}")
-        if result.unmeasured:
-            out.print("not measured, for lack of a feature point on a surface: " + ", ".join(result.unmeasured))
-        print_findings((*result.problems, *result.findings), out)
-        out.print("passed" if result.passed else "FAILED")
+        _print(result, worst)
     if not result.passed:
         raise typer.Exit(Outcome.FINDINGS)
+
+
+def _print(result: CheckResult, worst: bool) -> None:
+    from studio.cli.console import console, print_findings, table
+
+    out = console()
+    rows = sorted(result.compared, key=lambda r: -r[0].severity) if worst else result.compared
+    if rows:
+        table("", COLUMNS, [_cells(row, beside) for row, beside in rows], out)
+        out.print(
+            "flips: % of moving triangles; stretch: of hidden skin, times; seams: vertices that come apart; "
+            "in eyes: % of skin before the eyeballs; mirror: difference of the sides"
+        )
+        if result.source_quality is not None:
+            out.print("in brackets: the source's, where it differs")
+    if result.fidelity is not None:
+        for name, value in result.to_dict()["fidelity"].items():  # type: ignore[attr-defined]
+            out.print(f"{name}: {value:.4g}" if isinstance(value, float) else f"{name}: {value}")
+    if result.unmeasured:
+        out.print("not measured, for lack of a feature point on a surface: " + ", ".join(result.unmeasured))
+    print_findings((*result.problems, *result.remarks, *result.findings), out)
+    out.print("passed" if result.passed else "FAILED")
+
+
+def _cells(row: FapQuality, beside: FapQuality | None) -> tuple[str, ...]:
+    """One line of the table; the source's values in brackets."""
+
+    def cell(name: str, form: str, factor: float = 1.0) -> str:
+        mine, yours = (None if r is None else getattr(r, name) for r in (row, beside))
+        texts = ["-" if v is None else format(factor * v, form) for v in (mine, yours)]
+        return texts[0] if beside is None or texts[0] == texts[1] else f"{texts[0]} ({texts[1]})"
+
+    return (
+        str(row.fap_id),
+        row.name,
+        f"{row.value:+d}",
+        "-" if row.own is None else f"{100 * row.own.relative_error:.2f} %",
+        cell("cross_talk", ".1f", 100.0) + (" %" if row.cross_talk is not None else ""),
+        "" if row.cross_fap is None or not row.cross_talk else str(row.cross_fap),
+        cell("flips", ".2f"),
+        f"{row.limit:+d}",
+        cell("flips_at_limit", ".2f"),
+        cell("stretch", ".2f"),
+        "-" if row.parted is None else str(row.parted),
+        cell("penetration", ".2f"),
+        cell("asymmetry", ".1f", 100.0) + (" %" if row.asymmetry is not None else ""),
+        "" if row.passed else "FAIL",
+    )

@@ -47,7 +47,7 @@ def test_the_row_tells_of_the_head(row: DemoRow) -> None:
 def test_both_faces_read_back_check_and_play_alike(row: DemoRow) -> None:
     vrml, usd = (read_face(path) for path in row.files[:2])
     for face in (vrml, usd):
-        result = check_face(face)
+        result = check_face(face, read_face("default"))
         assert result.passed, result.problems
         assert len(face.tables) == row.tables
     smile = {3: 200, 12: 200, 13: 200, 48: 3000}
