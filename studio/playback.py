@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -21,14 +21,17 @@ LIMIT = 16 << 30
 """Largest .npz in bytes; a longer stream has to be cut."""
 
 
-def write_vertices(face: AnimatableFace, stream: FapStream, path: Path) -> None:
-    """Write neutral (N, 3), vertices (frames, N, 3) and fps, all shapes in file order, the file's axes and units."""
+def write_vertices(face: AnimatableFace, stream: FapStream, path: Path, rules: Collection[str] | None = None) -> None:
+    """Write neutral (N, 3), vertices (frames, N, 3) and fps, all shapes in file order, the file's axes and units.
+
+    rules : how FAPs that fight are combined; see `fat.evaluate.Player`.
+    """
     count = face.scene.vertex_count
     if len(stream) * count * 24 > LIMIT:
         raise OutputFileError(f"{path}: {len(stream)} frames of {count} vertices are too large for one .npz")
     vertices = np.empty((len(stream), count, 3))
     start = 0
-    for batch in Player(face).world_frames(stream):
+    for batch in Player(face, rules=rules).world_frames(stream):
         vertices[start : start + len(batch)] = to_file_order(face.scene, batch)
         start += len(batch)
     arrays = {
@@ -40,14 +43,19 @@ def write_vertices(face: AnimatableFace, stream: FapStream, path: Path) -> None:
 
 
 def draw_frames(
-    face: AnimatableFace, stream: FapStream, path: Path, size: int, tell: Callable[[str, float], None]
+    face: AnimatableFace,
+    stream: FapStream,
+    path: Path,
+    size: int,
+    tell: Callable[[str, float], None],
+    rules: Collection[str] | None = None,
 ) -> None:
     """Draw every frame into an animated picture, a film or a folder of pictures."""
     renderer = make_renderer()
     figure = Figure.of_face(face)
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
-        for index, pose in enumerate(Player(face).frames(stream)):
+        for index, pose in enumerate(Player(face, rules=rules).frames(stream)):
             tell("drawing", index / max(len(stream), 1))
             yield figure.draw(pose.world_shapes(), (size, size), renderer=renderer)
 

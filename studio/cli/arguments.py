@@ -44,6 +44,33 @@ def parse_faps(text: str) -> tuple[int, ...]:
     return tuple(dict.fromkeys(numbers))
 
 
+def parse_rules(text: str) -> tuple[str, ...]:
+    """Turn "all", "none" or "corners,lids" into combination rules.
+
+    Raises
+    ------
+    ValueError
+        If a rule is unknown, or none is named.
+
+    >>> parse_rules("lids,corners"), parse_rules("none")
+    (('corners', 'lids'), ())
+    """
+    from fat.combine import RULES, chosen_rules
+    from fba.errors import FapStreamError
+
+    names = [part for part in (p.strip() for p in text.split(",")) if part]
+    if names == ["all"]:
+        return RULES
+    if names == ["none"]:
+        return ()
+    if not names:
+        raise ValueError(f"no rule is named; write all, none, or some of {', '.join(RULES)}")
+    try:
+        return chosen_rules(names)
+    except FapStreamError as error:
+        raise ValueError(f"{error}; or write all or none") from None
+
+
 def _by_name(name: str) -> int:
     from fba.faps import fap
 

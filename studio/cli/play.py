@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from studio.cli.arguments import FacePath, OutPath
+from studio.cli.outcome import usage
 
 
 def play(
@@ -18,15 +19,26 @@ def play(
     hold: Annotated[
         bool, typer.Option("--hold", help="A FAP that a frame leaves out keeps its last value instead of 0.")
     ] = False,
+    rules: Annotated[
+        str,
+        typer.Option(
+            help="How FAPs that fight are combined: all, none (the plain sum), or corners,contours,lids,lips."
+        ),
+    ] = "all",
 ) -> None:
     """Play a FAP stream on a face: into .gif, .mp4, a folder of .png, or .npz (vertices of every frame)."""
     from fba.errors import UnknownFormatError
     from formats import read_face
     from formats.fap import read_fap
     from samples import sample
+    from studio.cli.arguments import parse_rules
     from studio.cli.console import console, print_findings, progress
     from studio.playback import draw_frames, write_vertices
 
+    try:
+        chosen = parse_rules(rules)
+    except ValueError as error:
+        usage(f"--rules: {error}")
     suffix = output.suffix.lower()
     if suffix not in (".gif", ".mp4", ".npz", ""):
         raise UnknownFormatError(f"{output}: choose .gif, .mp4, .npz, or a folder (no extension) for .png frames")
@@ -39,7 +51,7 @@ def play(
     print_findings(findings, out)
     with progress() as tell:
         if suffix == ".npz":
-            write_vertices(animatable, frames, output)
+            write_vertices(animatable, frames, output, chosen)
         else:
-            draw_frames(animatable, frames, output, size, tell)
+            draw_frames(animatable, frames, output, size, tell, chosen)
     out.print(f"{output}: {len(frames)} frames at {frames.frame_rate:g}/s")

@@ -153,6 +153,25 @@ def test_play_holds_values_on_request(cloned: Path, tmp_path: Path) -> None:
     assert moved[1][1] == moved[1][0]
 
 
+def test_play_combines_faps_by_rules_that_can_be_switched_off(tmp_path: Path) -> None:
+    write_fap(FapStream.build(25.0, 2, {12: [300, 300], 59: [0, 300]}), tmp_path / "corner.fap")
+    moved = {}
+    for rules in ("all", "none", "lids", "corners,lips"):
+        words = ("play", "default", tmp_path / "corner.fap", "-o", tmp_path / "o.npz", "--rules", rules)
+        assert fba(*words).exit_code == 0
+        with np.load(tmp_path / "o.npz") as played:
+            moved[rules] = np.abs(played["vertices"] - played["neutral"]).max(axis=(1, 2))
+    for rules, doubled in (("all", False), ("none", True), ("lids", True), ("corners,lips", False)):
+        once, both = moved[rules]
+        assert once == moved["none"][0]
+        assert (both > 1.5 * once) is np.bool_(doubled)
+    for wrong in ("corner", "", "none,lids"):
+        result = fba("play", "default", "demo", "-o", tmp_path / "p.npz", "--rules", wrong)
+        assert result.exit_code == Outcome.USAGE
+        assert "--rules" in result.stderr
+    assert not (tmp_path / "p.npz").exists()
+
+
 def test_play_draws(cloned: Path, tmp_path: Path) -> None:
     from PIL import Image
 
