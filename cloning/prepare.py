@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,19 +50,23 @@ class PreparedFace:
         return self.skin.positions[key] * self.fapu.es0
 
 
-def prepare(scene: FaceScene, points: FeaturePoints, who: str) -> PreparedFace:
+def prepare(
+    scene: FaceScene, points: FeaturePoints, who: str, needed: Sequence[str] = NECESSARY, purpose: str = ""
+) -> PreparedFace:
     """Orient, split, measure and label a face.
 
     Parameters
     ----------
     who : "source" or "target", for messages.
+    needed : the feature points that must be given.
+    purpose : what they are needed for, for messages; "" = cloning.
 
     Raises
     ------
     LandmarkError
         If necessary feature points are missing or contradict each other.
     """
-    points, findings = complete_points(scene, points, who)
+    points, findings = complete_points(scene, points, who, needed, purpose)
     scene, points, turned = orient(scene, points)
     scene, points, missing = split_parts(scene, points)
     positions = points.positions(scene)
@@ -69,7 +74,7 @@ def prepare(scene: FaceScene, points: FeaturePoints, who: str) -> PreparedFace:
     points, derived = _pivots(scene, points, fapu, who)
     shapes = [s.name for s in scene.with_role(Role.SKIN)]
     skin = build_surface(scene, points, shapes, fapu.es0)
-    if len([i for i in skin.points if i not in INSIDE]) < len(NECESSARY) - len(DERIVED):
+    if len([i for i in skin.points if i not in INSIDE]) < len(needed) - len(DERIVED):
         raise LandmarkError(
             f"the {who} '{scene.name}': only {len(skin.points)} feature points lie on the skin; "
             "give them as a face and barycentric coordinates, or as a vertex"
@@ -79,13 +84,15 @@ def prepare(scene: FaceScene, points: FeaturePoints, who: str) -> PreparedFace:
     return PreparedFace(scene, points, fapu, skin, labels, found)
 
 
-def complete_points(scene: FaceScene, points: FeaturePoints, who: str) -> tuple[FeaturePoints, list[Finding]]:
+def complete_points(
+    scene: FaceScene, points: FeaturePoints, who: str, needed: Sequence[str] = NECESSARY, purpose: str = ""
+) -> tuple[FeaturePoints, list[Finding]]:
     """Add what can be worked out, and say what is missing.
 
     Raises
     ------
     LandmarkError
-        If one of NECESSARY is missing and cannot be derived.
+        If one of those needed is missing and cannot be derived.
     """
     findings: list[Finding] = []
     added: dict[str, FeaturePoint] = {}
@@ -104,12 +111,8 @@ def complete_points(scene: FaceScene, points: FeaturePoints, who: str) -> tuple[
                 )
             )
     points = points.with_points(added)
-    points.require(
-        *NECESSARY,
-        purpose=f"cloning onto the target '{scene.name}'"
-        if who == "target"
-        else f"cloning from the source '{scene.name}'",
-    )
+    cloning = f"cloning {'onto' if who == 'target' else 'from'} the {who} '{scene.name}'"
+    points.require(*needed, purpose=purpose or cloning)
     known = feature_point_definitions()
     wanted = [i for i in known if i not in OPTIONAL and i not in INSIDE and not i.startswith("10.")]
     absent = [i for i in wanted if i not in points]

@@ -1,0 +1,161 @@
+"""The low-level FAPs of one face: given by a shape, made of units, or constructed, border by border."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from authoring import jaw
+from authoring.construct import construct
+from authoring.construction import Offsets
+from authoring.from_units import UnitMaker, UnitMotion
+from authoring.recipes import CONSTRUCTED_FIRST, RECIPES
+from authoring.report import How, Step
+from authoring.units import FaceShapes, Given
+from cloning.prepare import PreparedFace
+from fat.motion import FaceMotion
+from fat.quality import feature_point_motion
+from fba.faps import Fap, fap
+from fba.findings import Finding
+
+JAW = 3
+
+MOST_SCALED = 4.0
+"""A given shape that would have to be scaled more than this (or its inverse) to show its value is left as it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """One FAP: motions at its borders, how each was made, and why others were not."""
+
+    motions: tuple[FaceMotion, ...]
+    steps: tuple[Step, ...]
+    why: tuple[str, ...]
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class LowLevel:
+    """Makes the low-level FAPs of one face.
+
+    constructing : False leaves out what no shape shows.
+    """
+
+    face: PreparedFace
+    shapes: FaceShapes
+    maker: UnitMaker
+    constructing: bool
+
+    def make(self, fap_id: int) -> Made:
+        """One FAP, each side from the best that there is; no motions if there is nothing."""
+        entry = fap(fap_id)
+        found: dict[int, tuple[Offsets, Step]] = {}
+        why: list[str] = []
+        findings: list[Finding] = []
+        self._given(entry, found, why, findings)
+        for sign in (-1, 1) if entry.bidirectional else (1,):
+            if not any(value * sign > 0 for value in found):
+                self._side(entry, sign, found, why)
+        rows = sorted(found.items())
+        motions = tuple(FaceMotion(entry.name, fap_id, 1, value, offsets) for value, (offsets, _) in rows)
+        return Made(motions, tuple(step for _, (_, step) in rows), tuple(dict.fromkeys(why)), tuple(findings))
+
+    def _side(self, entry: Fap, sign: int, found: dict[int, tuple[Offsets, Step]], why: list[str]) -> None:
+        ways = [self._from_units, self._constructed]
+        if entry.id in CONSTRUCTED_FIRST:
+            ways.reverse()
+        for way in ways:
+            made = way(entry, sign)
+            if isinstance(made, str):
+                why.append(made)
+            else:
+                found.update(made)
+                return
+
+    def _given(
+        self, entry: Fap, found: dict[int, tuple[Offsets, Step]], why: list[str], findings: list[Finding]
+    ) -> None:
+        for given in self.shapes.given.get((entry.id, 1), ()):
+            value, factor, wrong = self._calibrated(entry, given)
+            if wrong:
+                findings.append(Finding("warning", "given-shape", f"'{given.shape}': {wrong}", f"FAP {entry.id}"))
+            if value in found:
+                why.append(f"'{given.shape}' shows the value {value} once more; the first shape is kept")
+            elif value:
+                offsets = {name: factor * part for name, part in given.offsets.items()}
+                found[value] = (offsets, Step(value, "given", {given.shape: factor}))
+
+    def _calibrated(self, entry: Fap, given: Given) -> tuple[int, float, str]:
+        """The value that a given shape shows, the factor that makes it exact, and what is wrong."""
+        moved = feature_point_motion(self.face.points, given.offsets).get(entry.feature_points[0])
+        if entry.direction is None or moved is None:
+            if given.value is None:
+                return 0, 0.0, f"nothing measures the value at which it shows {entry.name}; a map (--map) must say it"
+            return given.value, 1.0, ""
+        along = float(moved @ entry.direction) / self.face.fapu.unit(entry.unit)
+        value = given.value if given.value is not None else round(along)
+        if value == 0:
+            return (
+                0,
+                0.0,
+                (
+                    f"it does not move the feature point {entry.feature_points[0]} along the axis of {entry.name}; "
+                    "a map (--map) can say which value it shows"
+                ),
+            )
+        factor = value / along if along else 0.0
+        if not 1.0 / MOST_SCALED <= factor <= MOST_SCALED:
+            text = f"it moves its feature point by {along:.0f} FAP units, not by {value}; it is used as it is"
+            return value, 1.0, text
+        return value, factor, ""
+
+    def _from_units(self, entry: Fap, sign: int) -> dict[int, tuple[Offsets, Step]] | str:
+        recipe = RECIPES.get(entry.id)
+        borders = [b for b in recipe.borders if b.value * sign > 0] if recipe else []
+        if recipe is None or not borders:
+            return f"no unit shows {entry.name} {'below' if sign < 0 else 'above'} zero"
+        out: dict[int, tuple[Offsets, Step]] = {}
+        for border in borders:
+            made = self.maker.border(recipe, border)
+            if isinstance(made, str):
+                return made
+            out.update(self._steps(entry, made))
+        return out
+
+    def _steps(self, entry: Fap, made: UnitMotion) -> dict[int, tuple[Offsets, Step]]:
+        """The borders of one unit's motion: jaws turn and lids slide, in steps; all else goes straight."""
+        rows: Mapping[int, Offsets] = {made.value: made.offsets}
+        values = curved_values(entry.id, made.value)
+        if values and made.parts:
+            unit = self.maker.units.get(next(iter(made.parts)))
+            rows = curved(self.face, values, unit)
+        return {
+            value: (offsets, Step(value, "units", self._named(made.parts, value / made.value)))
+            for value, offsets in rows.items()
+        }
+
+    def _named(self, parts: Mapping[str, float], share: float) -> dict[str, float]:
+        """Factors by the shapes' own names."""
+        return {name: share * factor for unit, factor in parts.items() for name in self.maker.units.sources(unit)}
+
+    def _constructed(self, entry: Fap, sign: int) -> dict[int, tuple[Offsets, Step]] | str:
+        if not self.constructing:
+            return "constructions were not asked for"
+        motions, findings = construct(self.face, entry.id)
+        how: How = "constructed"
+        rows = {m.value: (dict(m.offsets), Step(m.value, how, {})) for m in motions if m.value * sign > 0}
+        if rows:
+            return rows
+        return "; ".join(f.message for f in findings) or f"the construction of {entry.name} has no such side"
+
+
+def curved_values(fap_id: int, value: int) -> tuple[int, ...]:
+    """Borders of a FAP whose unit is bent onto an arc; none for all others."""
+    if fap_id == JAW:
+        return tuple(b for b in jaw.OPEN_BORDERS if b * value > 0)
+    return ()
+
+
+def curved(face: PreparedFace, values: Sequence[int], unit: Offsets | None) -> Mapping[int, Offsets]:
+    """A motion on an arc at several values, after the unit that shows how the skin follows it."""
+    return jaw.open_jaw(face, values, unit)
