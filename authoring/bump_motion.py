@@ -1,0 +1,161 @@
+"""One FAP made of a bump: how far it reaches, what it leaves still, and the way its skin goes.
+
+A large motion goes step by step, each with the bump of the skin as it lies by then: what is squeezed between a moving
+and a still feature point becomes thin there, but does not fold over as it would along straight lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from authoring.bumps import Bumps, Goals, Place, bumps, pinned
+from authoring.carried import carrier
+from authoring.construction import Construction, Offsets
+from authoring.riders import skin_offsets
+from authoring.sliding import fit_round
+from cloning.prepare import PreparedFace
+from fba.arrays import Bools, Floats
+from fba.faps import fap
+
+STEP = 0.15
+"""Longest step, as a share of the bump's radius: bumps are no steeper than about 4 in a radius, so none folds."""
+
+LEVEL = 1e-9
+"""Depths below this, in eye separations, are rounding."""
+
+Values = dict[str, float]
+
+
+@dataclass(frozen=True)
+class BumpMotion:
+    """How one FAP moves the skin around its feature point.
+
+    Attributes
+    ----------
+    fap_id : the FAP.
+    borders : the interval borders but 0.
+    span : two feature points, whose distance measures the bump.
+    reach : radius of the bump, as a share of the span.
+    tied : feature points that move along with the FAP's own.
+    pins : feature points that stay still besides those that other FAPs move along the same axis.
+    slides : True if the skin follows the round of the head.
+    bulges : True if positive values take the skin along its normal at the feature point, as far as the FAP says along
+        its axis; negative ones go along the axis alone, because teeth lie behind.
+    carries : True if hidden skin behind the moving one, such as the mouth's lining, goes along.
+    shape : (face, feature point -> weight) -> more places with weights, to give the bump its outline.
+    """
+
+    fap_id: int
+    borders: tuple[int, ...]
+    span: tuple[str, str]
+    reach: float
+    tied: tuple[str, ...] = ()
+    pins: tuple[str, ...] = ()
+    slides: bool = False
+    bulges: bool = False
+    carries: bool = False
+    shape: Callable[[PreparedFace, Values], list[Place]] | None = None
+
+    @property
+    def own(self) -> str:
+        """The FAP's feature point."""
+        return fap(self.fap_id).feature_points[0]
+
+    @property
+    def construction(self) -> Construction:
+        """The construction of the FAP."""
+        return Construction(self.fap_id, self.borders, tuple(dict.fromkeys((self.own, *self.span))), self.make)
+
+    def make(self, face: PreparedFace, value: int) -> Offsets:
+        """Offsets at a border."""
+        made = _MADE.setdefault(face, {})
+        if self not in made:
+            made[self] = {v: skin_offsets(face, field) for v, field in self._fields(face)}
+        return dict(made[self][value])
+
+    def _fields(self, face: PreparedFace) -> Iterator[tuple[int, Floats]]:
+        """(border, field (n, 3) in eye separations), from 0 outwards on both sides."""
+        rest = face.skin.vertices
+        bump = self._bump(face, self._way(face, 1))
+        entry = fap(self.fap_id)
+        unit = face.fapu.unit(entry.unit) / face.fapu.es0
+        at_rest = bump.weight(rest)
+        ground = fit_round(face.skin, at_rest) if self.slides else None
+        for sign in (1, -1):
+            way = self._way(face, sign)
+            shift, field, reached = np.zeros_like(rest), np.zeros_like(rest), 0
+            for border in sorted((b for b in self.borders if b * sign > 0), key=abs):
+                length = (border - reached) * unit
+                steps = int(np.ceil(abs(length) / (STEP * bump.radius) - 1e-9))
+                for _ in range(steps):
+                    weight = bump.weight(rest + field) if shift.any() else at_rest
+                    shift = shift + (length / steps) * weight[:, None] * way
+                    field = ground.slide(rest, shift) if ground else shift
+                reached = border
+                yield border, bump.level(field) if ground else field
+
+    def _way(self, face: PreparedFace, sign: int) -> Floats:
+        """(3,) where the skin goes as the value rises above or falls below 0; 1 along the FAP's axis."""
+        direction = np.asarray(fap(self.fap_id).direction)
+        if not self.bulges or sign < 0:
+            return direction
+        normal = (face.skin.point_matrix([self.own]) @ face.skin.normals)[0]
+        normal /= max(float(np.linalg.norm(normal)), 1e-12)
+        aside = float(normal @ direction)
+        depth = float(np.clip(normal[2] / aside, 0.0, 1.0)) if aside > 0.0 else 0.0
+        way: Floats = direction + depth * np.array([0.0, 0.0, 1.0])
+        return way
+
+    def _bump(self, face: PreparedFace, way: Floats) -> _Bump:
+        maker = bumps(face)
+        a, b = (face.skin.positions[k] for k in self.span)
+        radius = self.reach * float(np.linalg.norm(a - b))
+        wanted = {self.own: 1.0, **{k: 1.0 for k in self.tied if k in face.skin.points}}
+        free = maker.within(tuple(wanted), radius)
+        pins = [k for axis in range(3) if way[axis] for k in pinned(axis, tuple(wanted))]
+        more = [] if self.shape is None else self.shape(face, wanted)
+        goals = maker.goals(wanted, [*pins, *self.pins], more)
+        return _Bump(maker, goals, free, radius, carrier(face) if self.carries else None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Bump:
+    """A bump on one face.
+
+    Attributes
+    ----------
+    goals : what it must be at places.
+    free : (n,) bool, the skin that may move.
+    radius : in eye separations.
+    carry : what hidden skin does, see `carrier`; None if it goes its own way.
+    """
+
+    maker: Bumps
+    goals: Goals
+    free: Bools
+    radius: float
+    carry: Any | None
+
+    def weight(self, places: Floats) -> Floats:
+        """The bump (n,) of the skin as it lies by now."""
+        weight = self.maker.weight(self.goals, self.free, places)
+        return weight if self.carry is None else self.carry @ weight
+
+    def level(self, field: Floats) -> Floats:
+        """The field without the depth that sliding gave to feature points whose depth other FAPs move."""
+        keys = [k for k in pinned(2) if k in self.maker.surface.points]
+        deep = self.maker.surface.point_matrix(keys) @ field[:, 2]
+        if np.abs(deep).max(initial=0.0) < LEVEL:
+            return field
+        goals = self.maker.goals({k: float(d) for k, d in zip(keys, deep, strict=True)})
+        leveled = field.copy()
+        leveled[:, 2] -= self.maker.weight(goals, self.free)
+        return leveled
+
+
+_MADE: WeakKeyDictionary[PreparedFace, dict[BumpMotion, dict[int, Offsets]]] = WeakKeyDictionary()

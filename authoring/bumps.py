@@ -1,0 +1,240 @@
+"""Smooth local fields on a skin: bumps that move one feature point and leave its neighbours still.
+
+A bump is the weight of least bending over a part of the skin, with value and slope 0 at its border, that takes given
+values at feature points. It is measured along the skin, so it never jumps from lip to lip or through the eye slit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from cloning.labels import OPPOSITE
+from cloning.prepare import PreparedFace
+from cloning.surface import Surface
+from fba.arrays import Bools, Floats, Ints
+from fba.faps import faps
+
+FLATTEST = 0.02
+"""Least weight of an edge, as a share of the mean: negative cotangents of obtuse corners fold the skin."""
+
+SMALLEST = 1e-3
+"""Least area of a vertex, as a share of the mean: slivers would count without bound."""
+
+DEPENDENT = 1e-9
+"""Feature points on the same vertices cannot move apart; below this relative size they count as one."""
+
+SOFT = 0.02
+"""How far, relative to its own stiffness, a place between feature points gives way: on a coarse mesh several lie in
+one triangle and would tear at it."""
+
+UNTOUCHED = 1e-12
+"""A place whose vertices have less weight than this is held still anyway."""
+
+STEEPEST = 20.0
+"""Largest cotangent: corners sharper than 3 degrees count as that."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A place on the skin, between vertices (k,) with weights (k,), and the weight a bump must have there."""
+
+    vertices: Ints
+    weights: Floats
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Goals:
+    """What a bump must be at some places.
+
+    Attributes
+    ----------
+    rows : (k, g) sparse, evaluates a weight there.
+    values : (k,) wanted.
+    softness : (k,) 0 where the weight must be exact.
+    """
+
+    rows: Any
+    values: Floats
+    softness: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Bumps:
+    """Makes the bumps of one face; get it by `bumps`."""
+
+    surface: Surface
+    labels: Ints
+
+    @cached_property
+    def _group(self) -> Ints:
+        """(n,) the place of each vertex; copies along a seam share one."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        n, links = self.surface.vertex_count, self.surface.links
+        pairs = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(n, n))
+        group: Ints = connected_components(pairs, directed=False)[1]
+        return group
+
+    @cached_property
+    def _fans(self) -> tuple[Ints, Floats]:
+        """Triangles (t, 3) of all fans of all polygons, and the share (t,) with which each counts.
+
+        A polygon bends as the mean of its fans from every corner, so that mirrored polygons bend alike.
+        """
+        return _all_fans(*self.surface.polygons)
+
+    def side(self, key: str) -> Bools:
+        """(n,) the skin that may move with a feature point: all but the lip or lid opposite to its own."""
+        vertices, weights = self.surface.points[key]
+        own = int(self.labels[vertices[np.argmax(weights)]])
+        return np.asarray(self.labels != OPPOSITE[own]) if own else np.ones(len(self.labels), dtype=bool)
+
+    def within(self, keys: Collection[str], radius: float) -> Bools:
+        """(n,) the skin nearer than a radius to one of these points, along the skin, on their own side of a slit."""
+        near = np.zeros(self.surface.vertex_count, dtype=bool)
+        for key in keys:
+            side = self.side(key)
+            near |= side & np.isfinite(self.surface.distances([key], radius, ~side)[0])
+        return near
+
+    def weight(self, goals: Goals, free: Bools, lying: Floats | None = None) -> Floats:
+        """The smoothest weight (n,) with given values at places of the skin.
+
+        Parameters
+        ----------
+        goals : where, and the weight there.
+        free : (n,) bool, the skin that may move; the weight is 0 elsewhere and ends without a slope.
+        lying : (n, 3) where the skin lies by now, in eye separations; None at rest.
+        """
+        from scipy.sparse.linalg import splu
+
+        count = int(self._group.max()) + 1
+        held = np.zeros(count, dtype=bool)
+        held[self._group[~free]] = True
+        places = np.flatnonzero(~held).astype(np.int32)
+        values = np.zeros(count)
+        rows = goals.rows[:, places]
+        touched = np.asarray(abs(rows).sum(axis=1)).ravel() > UNTOUCHED
+        if not touched.any():
+            return values[self._group]
+        rows, wanted = rows[touched].toarray(), goals.values[touched]
+        system = self._bending(places, self.surface.vertices if lying is None else lying)
+        follow = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(
+            np.ascontiguousarray(rows.T)
+        )
+        between = rows @ follow
+        size = np.sqrt(np.diag(between))
+        between = between / np.outer(size, size) + np.diag(goals.softness[touched])
+        heights = np.linalg.lstsq(between, wanted / size, rcond=DEPENDENT)[0] / size
+        values[places] = follow @ heights
+        weight: Floats = values[self._group]
+        return weight
+
+    def goals(self, wanted: Mapping[str, float], pins: Collection[str] = (), more: Sequence[Place] = ()) -> Goals:
+        """Put goals together.
+
+        Parameters
+        ----------
+        wanted : feature point -> weight there, exactly.
+        pins : feature points that stay still; those that are elsewhere than on the skin are left out.
+        more : further places, with about the weight there.
+        """
+        from scipy.sparse import coo_array, csr_array, vstack
+
+        keys = [*wanted, *(k for k in pins if k in self.surface.points and k not in wanted)]
+        values = [*(wanted.get(k, 0.0) for k in keys), *(p.value for p in more)]
+        row = np.repeat(np.arange(len(more)), [len(p.vertices) for p in more])
+        column = np.concatenate([p.vertices for p in more]) if more else np.zeros(0, np.int32)
+        weights = np.concatenate([p.weights for p in more]) if more else np.zeros(0)
+        n = self.surface.vertex_count
+        extra = coo_array((weights, (row, column)), shape=(len(more), n))
+        spread = csr_array((np.ones(n), (np.arange(n), self._group)))
+        rows = (vstack([self.surface.point_matrix(keys), extra]) @ spread).tocsr()
+        return Goals(rows, np.array(values), np.repeat([0.0, SOFT], [len(keys), len(more)]))
+
+    def _bending(self, places: Ints, vertices: Floats) -> Any:
+        """(k, k) sparse: ``w @ bending @ w`` is the bending of a weight over these places, 0 around them."""
+        from scipy.sparse import csc_array, diags_array
+
+        triangles, share = self._fans
+        corners = self._group[triangles]
+        inside = np.zeros(int(self._group.max()) + 1, dtype=bool)
+        inside[places] = True
+        inside[corners[inside[corners].any(axis=1)]] = True
+        used = inside[corners].any(axis=1)
+        around, local = np.unique(corners[used], return_inverse=True)
+        stretch, area = _stiffness(vertices[triangles[used]], share[used], local.reshape(-1, 3).astype(np.int32))
+        inverse = diags_array(1.0 / np.maximum(area, SMALLEST * float(area.mean())))
+        columns = stretch.tocsc()[:, np.searchsorted(around, places)]
+        return csc_array(columns.T @ inverse @ columns)
+
+
+_MADE: WeakKeyDictionary[PreparedFace, Bumps] = WeakKeyDictionary()
+
+
+def bumps(face: PreparedFace) -> Bumps:
+    """The maker of a face's bumps; made once for each face."""
+    if face not in _MADE:
+        _MADE[face] = Bumps(face.skin, face.labels.values)
+    return _MADE[face]
+
+
+def pinned(axis: int, but: Collection[str] = ()) -> list[str]:
+    """Feature points that some FAP moves along an axis (0 x, 1 y, 2 z), without some: cross-talk is measured there."""
+    found = {f.feature_points[0]: None for f in faps() if f.direction is not None and abs(f.direction[axis]) > 0.5}
+    return [k for k in found if k not in but]
+
+
+def _stiffness(places: Floats, share: Floats, corners: Ints) -> tuple[Any, Floats]:
+    """Cotangent Laplacian (k, k), positive semidefinite, and the area (k,) of each place.
+
+    Parameters
+    ----------
+    places : (t, 3, 3) corners of triangles. share : (t,) with which each counts. corners : (t, 3) their numbers.
+    """
+    from scipy.sparse import coo_array, diags_array
+
+    count = int(corners.max()) + 1
+    area = np.zeros(count)
+    rows, columns, values = [], [], []
+    for k in range(3):
+        apex, a, b = (places[:, (k + s) % 3] for s in range(3))
+        u, v = a - apex, b - apex
+        cross = np.linalg.norm(np.cross(u, v), axis=1)
+        cotangent = np.einsum("ij,ij->i", u, v) / np.maximum(cross, 1e-12)
+        rows.append(corners[:, (k + 1) % 3])
+        columns.append(corners[:, (k + 2) % 3])
+        values.append(0.5 * share * np.clip(cotangent, -STEEPEST, STEEPEST))
+        area += np.bincount(corners[:, k], share * cross / 6.0, count)
+    edges = coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
+    links = (edges + edges.T).tocsr()
+    links.setdiag(0.0)
+    links.data = np.where(links.data != 0.0, np.maximum(links.data, FLATTEST * float(np.abs(links.data).mean())), 0.0)
+    links.eliminate_zeros()
+    return diags_array(np.asarray(links.sum(axis=1)).ravel()) - links, area
+
+
+def _all_fans(indices: Ints, offsets: Ints) -> tuple[Ints, Floats]:
+    """Triangles (t, 3) of all fans of all polygons, and the share (t,) with which each counts."""
+    arity = np.diff(offsets)
+    triangles, shares = [], []
+    for k in np.unique(arity):
+        polygons = indices[offsets[:-1][arity == k][:, None] + np.arange(k)]
+        if k == 3:
+            triangles.append(polygons)
+            shares.append(np.ones(len(polygons)))
+            continue
+        for start in range(k):
+            turned = np.roll(polygons, -start, axis=1)
+            for step in range(1, k - 1):
+                triangles.append(turned[:, [0, step, step + 1]])
+                shares.append(np.full(len(polygons), 1.0 / k))
+    return np.concatenate(triangles), np.concatenate(shares)
