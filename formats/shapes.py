@@ -1,4 +1,4 @@
-"""Morph targets of a face: read from OBJ folders, .npz and glTF, written as OBJ folders and .npz.
+"""Morph targets of a face: read from OBJ folders, .npz, glTF and USD, written as OBJ folders and .npz.
 
 Everything is in the file's own axes, units and vertex order.
 """
@@ -37,7 +37,8 @@ def read_shapes(path: Path, neutral: FaceScene) -> ShapeSet:
     Parameters
     ----------
     path : a folder of OBJ files (or MakeHuman .target files), one for each target, named after it; an .npz with
-        names (K,), deltas (K, N, 3) and optionally neutral (N, 3); a .glb or .gltf with morph targets.
+        names (K,), deltas (K, N, 3) and optionally neutral (N, 3); a .glb or .gltf with morph targets; a .usda,
+        .usdc or .usd with blend shapes.
     neutral : the face that they belong to, N vertices.
 
     Raises
@@ -56,10 +57,12 @@ def read_shapes(path: Path, neutral: FaceScene) -> ShapeSet:
         found = _read_npz(path, len(base))
     elif name.endswith((".glb", ".gltf")):
         found = _read_gltf(path, len(base))
+    elif name.endswith((".usda", ".usdc", ".usd")):
+        found = _read_usd(path, len(base))
     elif not path.exists():
         raise InputFileError(f"{path} does not exist; check the path")
     else:
-        raise UnknownFormatError(f"{path}: morph targets come as a folder of OBJ files, .npz, .glb or .gltf")
+        raise UnknownFormatError(f"{path}: morph targets come as a folder of OBJ files, .npz, glTF or USD")
     if not found:
         raise InputFileError(f"{path} holds no morph targets")
     deltas = np.empty((len(found), len(base), 3))
@@ -165,6 +168,16 @@ def _read_gltf(path: Path, count: int) -> _Targets:
             parts.append(np.zeros((s.mesh.vertex_count, 3)) if offsets is None else offsets @ linear.T)
         found.append((name, np.concatenate(parts)))
     return found
+
+
+def _read_usd(path: Path, count: int) -> _Targets:
+    from formats.usd import read_shape_set
+
+    found = read_shape_set(path)
+    if found is None:
+        return []
+    _check_count(path, len(found.neutral), count)
+    return list(zip(found.names, found.deltas, strict=True))
 
 
 def write_shapes(shapes: ShapeSet, like: FaceScene, path: Path) -> None:

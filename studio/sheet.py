@@ -203,6 +203,27 @@ def contact_sheet(
     return sheet.image()
 
 
+def face_sheet(
+    face: AnimatableFace | Player,
+    poses: Sequence[PosePick] | None = None,
+    *,
+    title: str = "",
+    cell: int = 180,
+    columns: int = 8,
+    yaw: float = 0.0,
+    renderer: Renderer | None = None,
+) -> Image.Image:
+    """Draw one face in many poses; the parameters are those of `contact_sheet`."""
+    player = face if isinstance(face, Player) else Player(face)
+    picks = list(poses) if poses is not None else default_poses(player.face)
+    drawn = _draw_poses(player, picks, cell, yaw, renderer or make_renderer())
+    sheet = Sheet(title)
+    for start in range(0, len(picks), columns):
+        band = slice(start, start + columns)
+        sheet.add_row("", drawn[band], [p.caption for p in picks[band]], space_before=2 * GAP)
+    return sheet.image()
+
+
 def _draw_poses(player: Player, picks: Sequence[PosePick], cell: int, yaw: float, renderer: Renderer) -> list[UInt8]:
     figure = Figure.of_face(player.face)
     camera = figure.camera.turned(yaw)

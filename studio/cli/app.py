@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from studio.cli.author import author
 from studio.cli.check import check
 from studio.cli.clone import clone
 from studio.cli.demo import demo
@@ -24,7 +25,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for verb in (demo, inspect, clone, export, play, check, doctor):
+for verb in (demo, inspect, clone, author, export, play, check, doctor):
     app.command()(guarded(verb))
 
 

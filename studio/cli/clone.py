@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from studio.cli.outcome import usage
+from studio.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
     from cloning import CloneReport
@@ -45,30 +46,13 @@ def clone(
         wanted = None if faps is None else parse_faps(faps)
     except ValueError as error:
         usage(f"--faps: {error}")
-    _check_outputs(output, report, sheet, inputs=(target, landmarks, source_landmarks, shapes))
+    check_outputs(output, report, sheet, inputs=(target, landmarks, source_landmarks, shapes))
     if shapes is not None:
         if wanted is not None or sheet is not None:
             usage("--shapes clones every shape as it is; it does not go with --faps or --sheet")
         _clone_shapes(target, output, source, landmarks, source_landmarks, shapes, backend, as_published, report)
     else:
         _clone_face(target, output, source, landmarks, source_landmarks, wanted, backend, as_published, report, sheet)
-
-
-def _check_outputs(output: Path, report: Path | None, sheet: Path | None, inputs: tuple[Path | None, ...]) -> None:
-    """Refuse what could only fail, or overwrite another file of the same call, after minutes of work."""
-    from formats.files import require_folder
-
-    if sheet is not None and sheet.suffix.lower() != ".png":
-        usage(f"--sheet {sheet}: the contact sheet is a .png")
-    taken = {path.absolute() for path in inputs if path is not None}
-    for option, path in (("--report", report), ("--sheet", sheet)):
-        if path is not None and path.absolute() in {*taken, output.absolute()}:
-            usage(f"{option} {path}: this call reads or writes that file already; choose another name")
-        if path is not None:
-            taken.add(path.absolute())
-    for path in (output, report, sheet):
-        if path is not None:
-            require_folder(path)
 
 
 def _clone_face(
