@@ -1,38 +1,54 @@
-"""``fba export``: write a face in another format."""
+"""``fba export``: write a face in another format, or the shapes of a profile."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from studio.cli.arguments import FacePath, OutPath
 from studio.cli.outcome import usage
 
+if TYPE_CHECKING:
+    from fat.face import AnimatableFace
+    from fat.profiles import Profile
+
 
 def export(
     face: FacePath,
     output: OutPath,
     profile: Annotated[
-        str, typer.Option(help="native: everything the tables say, in the format's own terms.")
+        str,
+        typer.Option(
+            help="native: everything the tables say, in the format's own terms; arkit, oculus, vrm: the shapes of "
+            "that name, to .npz, .usda, .usdc or a folder of OBJ."
+        ),
     ] = "native",
 ) -> None:
     """Write a face in another format; its tables go along where the format can carry them."""
+    from fat.profiles import PROFILES
+
+    if profile == "native":
+        _export_face(face, output)
+        return
+    chosen = next((p for p in PROFILES if p == profile), None)
+    if chosen is None:
+        usage(f"--profile: there is no profile '{profile}'; known: native, {', '.join(PROFILES)}")
+    else:
+        _export_profile(face, output, chosen)
+
+
+def _export_face(face: Path, output: Path) -> None:
     from fat.face import AnimatableFace
-    from fat.validate import validate
-    from fba.errors import FaceDefTablesError
     from formats import format_of, read, write
     from studio.cli.console import console, print_findings
     from studio.inputs import left_behind, scene_of
 
-    if profile != "native":
-        usage(f"--profile: there is no profile '{profile}'; known: native")
     entry = format_of(output, writing=True)
     found = read(str(face))
     if isinstance(found, AnimatableFace):
-        broken = [f for f in validate(found) if f.severity == "error"]
-        if broken:
-            raise FaceDefTablesError(f"{face} cannot be played, so it is not exported: {broken[0].message}")
+        _refuse_broken(found, face)
     write(found, output)
     out = console()
     print_findings(left_behind(scene_of(found), face, output), out)
@@ -42,3 +58,40 @@ def export(
         out.print(f"{output}: {len(found.tables)} tables for {found.scene.vertex_count} vertices")
     else:
         out.print(f"{output}: plain mesh, {found.vertex_count} vertices")
+
+
+def _export_profile(face: Path, output: Path, profile: Profile) -> None:
+    from fat.profiles import profile_shapes
+    from formats import read_face
+    from formats.files import require_folder
+    from formats.shapes import write_shapes
+    from formats.usd import write_shape_set
+    from studio.cli.console import console, print_findings
+    from studio.inputs import left_behind
+
+    kind = output.suffix.lower()
+    stage = kind in (".usd", ".usda", ".usdc")
+    if kind in (".glb", ".gltf"):
+        usage(f"{output}: glTF is not written yet; choose .npz, .usda, .usdc, or a folder of OBJ (no extension)")
+    if not stage and kind not in (".npz", "") and not output.is_dir():
+        usage(f"{output}: shapes are written to .npz, .usda, .usdc, or a folder of OBJ (no extension)")
+    require_folder(output)
+    found = read_face(str(face))
+    _refuse_broken(found, face)
+    shapes, findings = profile_shapes(found, profile)
+    if stage:
+        write_shape_set(found.scene, shapes, output)
+    else:
+        write_shapes(shapes, found.scene, output)
+    out = console()
+    print_findings([*findings, *left_behind(found.scene, face, output)], out)
+    out.print(f"{output}: {len(shapes.names)} shapes of the profile '{profile}' for {len(shapes.neutral)} vertices")
+
+
+def _refuse_broken(face: AnimatableFace, path: Path) -> None:
+    from fat.validate import validate
+    from fba.errors import FaceDefTablesError
+
+    broken = [f for f in validate(face) if f.severity == "error"]
+    if broken:
+        raise FaceDefTablesError(f"{path} cannot be played, so it is not exported: {broken[0].message}")

@@ -1,0 +1,92 @@
+"""Build the shapes of a profile from a face's tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from fat.evaluate import Player
+from fat.face import AnimatableFace
+from fat.profiles.tables import Profile, ProfileShape, profile_table
+from fat.tables import table_name
+from fba.arrays import Floats
+from fba.errors import FaceDefTablesError
+from fba.faps import EXPRESSION_FAP, VISEME_FAP
+from fba.findings import Finding
+from fba.high_level import BLEND_MAX
+from fba.orientation import to_file_order
+from fba.shapes import ShapeSet
+
+RULES = ("corners",)
+"""Of `fat.combine`: where inner and outer lip corner are tied, the two FAPs of a shape move the corner once. The rest
+is the standard's sum: a shape such as mouthClose is meant to be added to others."""
+
+_Key = tuple[int, int]
+
+
+def profile_shapes(face: AnimatableFace, profile: Profile) -> tuple[ShapeSet, list[Finding]]:
+    """Evaluate every shape of a profile on a face, all its parts.
+
+    Parameters
+    ----------
+    face : its tables make the shapes. FAPs that it has no tables for are left out of them.
+
+    Returns
+    -------
+    shapes : in the file's own axes, units and vertex order; shapes of which the face has no FAP at all are left out.
+    findings : shapes that are not whole, and why.
+
+    Raises
+    ------
+    FaceDefTablesError
+        If the face can show no shape of the profile, or its tables are damaged.
+    """
+    player = Player(face, rules=RULES)
+    neutral = face.scene.world_neutral()
+    names, deltas = [], []
+    findings: list[Finding] = []
+    for shape in profile_table(profile):
+        wanted = _keys(shape)
+        missing = [key for key in wanted if face.tables.get(*key) is None]
+        if missing:
+            findings.append(_incomplete(shape, missing, len(missing) == len(wanted)))
+        if shape.still or len(missing) < len(wanted):
+            names.append(shape.name)
+            deltas.append(to_file_order(face.scene, _world(player, shape) - neutral))
+    if not any(map(np.any, deltas)):
+        raise FaceDefTablesError(
+            f"the tables of '{face.scene.name}' move none of the shapes of the profile '{profile}'; "
+            "`fba inspect` lists the FAPs that they have"
+        )
+    return ShapeSet(tuple(names), to_file_order(face.scene, neutral), np.stack(deltas)), findings
+
+
+def _world(player: Player, shape: ProfileShape) -> Floats:
+    """(N, 3) vertices with the shape at weight 1; inside axes."""
+    viseme = (shape.viseme, 0, BLEND_MAX) if shape.viseme else None
+    expression = (shape.expression, shape.intensity, 0, 0) if shape.expression else None
+    return player.pose(shape.faps, viseme, expression).world()
+
+
+def _keys(shape: ProfileShape) -> list[_Key]:
+    """(fap_id, high_level_select) of the tables that a shape needs."""
+    keys = [(number, 1) for number in shape.faps]
+    if shape.viseme:
+        keys.append((VISEME_FAP, shape.viseme))
+    if shape.expression:
+        keys.append((EXPRESSION_FAP, shape.expression))
+    return keys
+
+
+def _incomplete(shape: ProfileShape, missing: Iterable[_Key], whole: bool) -> Finding:
+    listed = ", ".join(_named(key) for key in missing)
+    if whole:
+        text = f"the shape is left out: the face has no table for {listed}"
+        return Finding("warning", "profile-shape-missing", text, shape.name)
+    text = f"the shape lacks a part: the face has no table for {listed}"
+    return Finding("warning", "profile-shape-partial", text, shape.name)
+
+
+def _named(key: _Key) -> str:
+    return table_name(*key) if key[0] <= EXPRESSION_FAP else f"FAP {key[0]} {table_name(*key)}"
