@@ -13,6 +13,9 @@ from fba.arrays import Floats, Ints
 FLATTEST = 0.02
 """Least weight of an edge as a share of the mean: cotangents of obtuse corners are negative and would overshoot."""
 
+FAINTEST = 1e-9
+"""Firmness that every vertex has: pieces of a mesh on which nothing is wanted rest."""
+
 
 @dataclass(frozen=True, eq=False)
 class Spread:
@@ -35,7 +38,7 @@ class Spread:
         Parameters
         ----------
         wanted : (n,) shares in 0..1.
-        firmness : (n,) how firmly each vertex holds what is wanted; 0 = follows its neighbours.
+        firmness : (n,) how firmly each vertex holds what is wanted; 0 = follows its neighbours, inf = exactly.
         length : over about this distance a field of firmness 1 is smoothed, in the units of the mesh.
 
         Returns
@@ -45,12 +48,21 @@ class Spread:
         from scipy.sparse import diags_array
         from scipy.sparse.linalg import splu
 
-        counts = np.asarray(self.join.sum(axis=1)).ravel()
-        firm = self.area * (self.join @ firmness) / counts + 1e-9 * self.area.mean()
-        goal = (self.join @ (firmness * wanted)) / np.maximum(self.join @ firmness, 1e-300)
-        system = (length**4 * self.bending + diags_array(firm)).tocsc()
-        solved = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        field: Floats = np.clip(self.join.T @ solved.solve(firm * goal), 0.0, 1.0)
+        exact = np.isinf(firmness)
+        soft = np.where(exact, 0.0, firmness)
+        total, copies = self.join @ soft, np.asarray(self.join.sum(axis=1)).ravel()
+        goal = (self.join @ (soft * wanted)) / np.maximum(total, 1e-300)
+        held = self.join @ exact.astype(np.float64) > 0.0
+        goal[held] = ((self.join @ (exact * wanted)) / np.maximum(self.join @ exact.astype(np.float64), 1.0))[held]
+        free = np.flatnonzero(~held)
+        if len(free):
+            firm = (self.area * (total / copies + FAINTEST))[free]
+            rows = length**4 * self.bending[free]
+            system = (rows[:, free] + diags_array(firm)).tocsc()
+            right = firm * goal[free] - rows[:, np.flatnonzero(held)] @ goal[held]
+            solver = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+            goal[free] = solver.solve(right)
+        field: Floats = np.clip(self.join.T @ goal, 0.0, 1.0)
         return field
 
 

@@ -1,0 +1,335 @@
+"""The lids, FAPs 19-22: skin that slides over the eyeball and closes on a line.
+
+A lid turns about the horizontal axis through the middle of the eyeball, so it keeps its distance from the ball. In
+every slice of constant x its rim goes the same share of the way to the other lid's rim: 1024 units of the upper or
+the lower lid close the eye, and so does any mixture of both with that sum. The skin between the rim and the brow (or
+the cheek) follows less and less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from authoring.construction import Construction, Offsets
+from authoring.riders import carried, in_mesh_units
+from authoring.spread import Spread, spread
+from cloning.eyeballs import Ball, balls
+from cloning.labels import OPPOSITE
+from cloning.prepare import PreparedFace
+from cloning.rims import EYES, Eye, eyes
+from cloning.surface import Surface
+from fba.arrays import Bools, Floats
+from fba.faps import fap
+from fba.fapu import FAPU_DIVISOR
+from fba.findings import Finding
+
+LIDS = {19: (0, 0), 20: (1, 0), 21: (0, 1), 22: (1, 1)}
+"""FAP -> eye (0 left, 1 right) and lid (0 upper, 1 lower)."""
+
+UPPER_BORDERS = (-1080, -768, -512, -256, 256, 512, 768, 1024, 1080)
+LOWER_BORDERS = (-600, -256, 256, 512, 600)
+"""A chord of 256 units stays within .4 % of the eyeball's radius of its arc."""
+
+OVERLAP = 0.05
+"""A rim goes this share of the eye's opening beyond the other one, but for its feature point, which goes exactly its
+way; so no light falls through where rims with different vertices meet."""
+
+ANY = 1.0
+"""Rims that have gone farther than asked are left so."""
+
+BESIDE = 0.2
+"""Share of the way from the feature point to each corner over which the overlap grows."""
+
+RIM = 0.02
+"""So near to its rim, in eye separations, a lid goes along wholly."""
+
+CLOSING, OPENING = 0.22, 0.4
+"""Farther from the rim the skin outside rests, in eye separations: a closing lid unrolls from its fold, an opening
+one pushes the skin together up to the brow."""
+
+BEHIND = 0.35
+"""Farther from the rim the lining of the socket rests, in eye separations."""
+
+SMOOTH = 0.04
+"""Length over which shares are smoothed, in eye separations."""
+
+HELD = 100.0
+"""How firmly rims and feature points hold their share."""
+
+STILL_POINTS = (
+    *(f"4.{k}" for k in range(1, 7)),
+    *(f"5.{k}" for k in range(1, 5)),
+    *(f"9.{k}" for k in (1, 2, 3, 4, 5, 6, 7, 12, 13, 14, 15)),
+)
+
+LAYER = 0.02
+"""A lid clears the ball by no more than this, in radii; by less where it is nearer at rest."""
+
+INSIDE = -0.02
+"""What lies deeper in the ball at rest, in radii, is the back of the socket and not watched."""
+
+FARTHEST = np.radians(70.0)
+"""A lid turns by less than this."""
+
+STEEPEST = 0.97
+"""Largest sine of a rim's height over the middle of the ball."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lid:
+    """One lid of a face that is ready to move.
+
+    Attributes
+    ----------
+    eye, part : of `cloning.rims`; part 0 upper, 1 lower.
+    ball : the eyeball.
+    slices : (s,) x of the rim, from corner to corner.
+    rims : (2, s) heights of the own and of the other rim over the middle of the ball.
+    reach : (s,) distance of the own rim from the axis through the middle of the ball.
+    closing, opening : (n,) share of the rim's turn that each vertex of the skin follows.
+    """
+
+    face: PreparedFace
+    fap_id: int
+    eye: Eye
+    part: int
+    ball: Ball
+    slices: Floats
+    rims: Floats
+    reach: Floats
+    closing: Floats
+    opening: Floats
+
+    def at(self, value: float) -> Offsets:
+        """Offsets at a FAP value; the lid's feature point moves by exactly that."""
+        face = self.face
+        share = self.closing if value > 0 else self.opening
+        scale = self._exact(share, value)
+        turned = self._turned(face.skin.vertices, share, value, scale)
+        skin = turned.copy()
+        if value > 0:
+            skin[self.eye.lids[self.part].vertices, 1] += self.eye.follow(self.part, skin, self._travel(value), ANY)
+        self._clear(skin)
+        riders = carried(face, skin - turned)
+        shares = carried(face, np.repeat(share[:, None], 3, axis=1))
+        for name, rest in riders.items():
+            places = face.scene.world_vertices(name) / face.fapu.es0
+            rest += self._turned(places, shares[name][:, 0], value, scale)
+        return in_mesh_units(face, {**face.skin.split(skin), **riders})
+
+    def angles(self, value: float) -> Floats:
+        """(s,) angle about +x that takes the rim its share of the way to the other rim."""
+        own, other = self.rims
+        goal = own + value / FAPU_DIVISOR * (other - own)
+        sines = [np.arcsin(np.clip(y / self.reach, -STEEPEST, STEEPEST)) for y in (own, goal)]
+        angles: Floats = sines[0] - sines[1]
+        return angles
+
+    def _turned(self, places: Floats, share: Floats, value: float, scale: float) -> Floats:
+        """Offsets (n, 3) of places that follow a share of the turn of the rim at their x."""
+        turn = scale * share * np.interp(places[:, 0], self.slices, self.angles(value), left=0.0, right=0.0)
+        _, y, z = (places - self.middle).T
+        cosine, sine = np.cos(turn) - 1.0, np.sin(turn)
+        return np.column_stack([np.zeros(len(places)), cosine * y - sine * z, sine * y + cosine * z])
+
+    def _exact(self, share: Floats, value: float) -> float:
+        """The scale of the turn with which the feature point moves exactly by the value."""
+        from scipy.optimize import brentq
+
+        entry, skin = fap(self.fap_id), self.face.skin
+        assert entry.direction is not None
+        vertices, weights = skin.points[entry.feature_points[0]]
+        wanted = value * self.face.fapu.unit(entry.unit) / self.face.fapu.es0 * entry.direction[1]
+
+        def missing(scale: float) -> float:
+            return float(weights @ self._turned(skin.vertices[vertices], share[vertices], value, scale)[:, 1]) - wanted
+
+        turn = float(np.abs(np.interp(skin.vertices[vertices, 0], self.slices, self.angles(value))).max())
+        return float(brentq(missing, 0.0, FARTHEST / turn, xtol=1e-13))
+
+    def _travel(self, value: float) -> Floats:
+        """Share of the opening for each of the eye's slices."""
+        count = len(self.eye.open)
+        beside = _smoothstep(np.abs(np.linspace(-1.0, 1.0, count + 2)[1:-1]) / BESIDE)
+        opening = self.eye.opening
+        beyond = OVERLAP * opening.max() / np.where(self.eye.open, opening, np.inf)
+        travel: Floats = value / FAPU_DIVISOR * (1.0 + beside * beyond)
+        return travel
+
+    def _clear(self, skin: Floats) -> None:
+        """Push (n, 3) offsets forward where the skin would come nearer to the ball than it rests; heights stay."""
+        ball, es0 = self.ball, self.face.fapu.es0
+        moved = np.any(skin[ball.vertices] != 0.0, axis=1)
+        vertices = ball.vertices[moved]
+        local = (ball.rest[moved] - ball.center) / es0
+        rest = ball.clearance(local)
+        place = local + skin[vertices]
+        needed = ball.radius(place) / es0 * (1.0 + np.minimum(rest, LAYER))
+        front = np.sqrt(np.maximum(needed**2 - place[:, 0] ** 2 - place[:, 1] ** 2, 0.0))
+        watched = (rest > INSIDE) & (local[:, 2] > 0.0) & (place[:, 2] > 0.0)
+        skin[vertices, 2] += np.where(watched, np.maximum(front - place[:, 2], 0.0), 0.0)
+
+    @property
+    def middle(self) -> Floats:
+        """(3,) the middle of the ball, in eye separations."""
+        center: Floats = self.ball.center / self.face.fapu.es0
+        return center
+
+
+def close_lid(
+    face: PreparedFace, fap_id: int, values: Iterable[int], unit: Offsets | None = None
+) -> dict[int, Offsets]:
+    """FAPs 19-22 at each of these values; empty where the lids are grown together.
+
+    Parameters
+    ----------
+    values : FAP values in IRISD units; 1024 closes the eye, negative ones open it wider.
+    unit : offsets of a modelled closing, of which the spread over the skin is taken; None = constructed.
+    """
+    found = lid(face, fap_id, unit)
+    return {} if found is None else {value: found.at(value) for value in values}
+
+
+def findings(face: PreparedFace) -> list[Finding]:
+    """Why lids cannot be made, for each eye of which that is so."""
+    return [
+        Finding(
+            "warning",
+            "no-lids",
+            f"the {side} eye's lids cannot close: they are grown together, too coarse, or there is no eyeball "
+            "below them; model the eye open, and give feature points at its lids and corners",
+            face.scene.name,
+        )
+        for side, fap_id in (("left", 19), ("right", 20))
+        if lid(face, fap_id) is None
+    ]
+
+
+_MADE: WeakKeyDictionary[PreparedFace, dict[int, Lid | None]] = WeakKeyDictionary()
+
+
+def lid(face: PreparedFace, fap_id: int, unit: Offsets | None = None) -> Lid | None:
+    """Prepare a lid; None where the lids are grown together or there is no eyeball.
+
+    Parameters
+    ----------
+    unit : as for `close_lid`.
+    """
+    made = _MADE.setdefault(face, {})
+    if fap_id not in made:
+        made[fap_id] = _lid(face, fap_id)
+    found = made[fap_id]
+    if found is None or unit is None:
+        return found
+    return replace(found, closing=_modelled(found, unit))
+
+
+def _lid(face: PreparedFace, fap_id: int) -> Lid | None:
+    side, part = LIDS[fap_id]
+    eye, pupil = eyes(face)[side], face.place(("3.5", "3.6")[side])
+    near = [b for b in balls(face) if np.linalg.norm(b.center - pupil) < 2.0 * float(np.median(b.radii))]
+    if eye is None or not near:
+        return None
+    center = near[0].center / face.fapu.es0
+    corners = np.array([face.skin.positions[k] for k in EYES[side][0]])
+    own, other = (_rim_line(eye, k, corners) - center for k in (part, 1 - part))
+    heights = np.stack([own[:, 1], np.interp(own[:, 0], other[:, 0], other[:, 1])])
+    reach = np.hypot(own[:, 1], own[:, 2])
+    nothing = np.zeros(face.skin.vertex_count)
+    found = Lid(face, fap_id, eye, part, near[0], own[:, 0] + center[0], heights, reach, nothing, nothing)
+    closing, opening = (_shares(found, above) for above in (CLOSING, OPENING))
+    return replace(found, closing=closing, opening=opening)
+
+
+def _rim_line(eye: Eye, part: int, corners: Floats) -> Floats:
+    """Places (s, 3) along a rim by rising x, from corner to corner."""
+    lid = eye.lids[part]
+    heights, edges, shares = lid.rim(lid.rest)
+    used = eye.open & np.isfinite(heights)
+    a, b = (lid.rest[edges[used, k]] for k in range(2))
+    return np.concatenate([corners[:1], a + shares[used, None] * (b - a), corners[1:]])
+
+
+def _shares(lid: Lid, above: float) -> Floats:
+    """Shares that fall from 1 at the rim to 0 where the skin rests, `above` from the rim outside."""
+    rim, rest = _regions(lid, above)
+    firmness = np.where(rim, HELD, 0.0)
+    firmness[rest] = np.inf
+    return _plate(lid.face)(np.where(rim, 1.0, 0.0), firmness, SMOOTH)
+
+
+def _modelled(lid: Lid, unit: Offsets) -> Floats:
+    """Shares of a modelled closing: the angle by which each vertex is turned beside that of the rim at its x."""
+    skin = lid.face.skin
+    y, z = (skin.vertices - lid.middle)[:, 1:].T
+    moved = skin.vertices - lid.middle + skin.join(unit) / lid.face.fapu.es0
+    angle = np.arctan2(y * moved[:, 2] - z * moved[:, 1], y * moved[:, 1] + z * moved[:, 2])
+    rims = np.interp(skin.vertices[:, 0], lid.slices, lid.angles(FAPU_DIVISOR), left=0.0, right=0.0)
+    point = skin.point_matrix([fap(lid.fap_id).feature_points[0]])
+    full = float((point @ angle)[0]) / float((point @ rims)[0])
+    shares = np.clip(np.divide(angle, full * rims, out=np.zeros_like(angle), where=rims != 0.0), 0.0, 1.0)
+    rim, rest = _regions(lid, OPENING)
+    firmness = (rims / np.abs(rims).max()) ** 2
+    firmness[rim], firmness[rest] = HELD, np.inf
+    return _plate(lid.face)(np.where(rim, 1.0, np.where(rest, 0.0, shares)), firmness, SMOOTH)
+
+
+def _regions(lid: Lid, above: float) -> tuple[Bools, Bools]:
+    """(n,) the skin at the rim that goes along wholly, and the skin that rests."""
+    skin, labels = lid.face.skin, lid.face.labels.values
+    side, part = LIDS[lid.fap_id]
+    own = 3 + 2 * side + part
+    away = _from_rim(skin, lid.eye, lid.part)
+    lining = np.einsum("ij,ij->i", skin.normals, skin.vertices - lid.middle) < 0.0
+    rest = (away > np.where(lining, BEHIND, above)) | (labels == OPPOSITE[own])
+    for key in STILL_POINTS:
+        if key in skin.points:
+            vertices, weights = skin.points[key]
+            rest[vertices[weights > 0.0]] = True
+    return (away < RIM) & (labels == own) & ~rest, rest
+
+
+def _from_rim(skin: Surface, eye: Eye, part: int) -> Floats:
+    """(n,) distance along the skin from the rim of a lid."""
+    lid = eye.lids[part]
+    heights, edges, shares = lid.rim(lid.rest)
+    used = np.flatnonzero(eye.open & np.isfinite(heights))
+    points = {str(k): (lid.vertices[edges[k]], np.array([1.0 - shares[k], shares[k]])) for k in used}
+    places = {key: weights @ skin.vertices[vertices] for key, (vertices, weights) in points.items()}
+    limit = 1.5 * max(BEHIND, OPENING)
+    away: Floats = replace(skin, points=points, positions=places).distances(points, limit).min(axis=0)
+    return away
+
+
+def _plate(face: PreparedFace) -> Spread:
+    if face not in _PLATES:
+        _PLATES[face] = spread(face.skin)
+    return _PLATES[face]
+
+
+_PLATES: WeakKeyDictionary[PreparedFace, Spread] = WeakKeyDictionary()
+
+
+def _smoothstep(t: Floats) -> Floats:
+    t = np.clip(t, 0.0, 1.0)
+    smooth: Floats = t * t * (3.0 - 2.0 * t)
+    return smooth
+
+
+def _construction(fap_id: int, borders: tuple[int, ...]) -> Construction:
+    needs = [k for corners, lids in EYES for k in (*corners, lids[0][0], lids[1][0]) if fap_id in _OF_EYE[corners]]
+    return Construction(
+        fap_id, borders, tuple(needs), lambda face, value: close_lid(face, fap_id, [value]).get(value, {})
+    )
+
+
+_OF_EYE = {EYES[0][0]: (19, 21), EYES[1][0]: (20, 22)}
+
+CONSTRUCTIONS: Mapping[int, Construction] = MappingProxyType(
+    {n: _construction(n, UPPER_BORDERS if LIDS[n][1] == 0 else LOWER_BORDERS) for n in LIDS}
+)
