@@ -23,10 +23,10 @@ def skin_materials(head: Head) -> Ints:
     for name in CONTOURS:
         lip |= _lip(masks, name)
     lip &= np.abs(mesh.vertices[:, 0]) <= head.positions["8.3"][0] * 1.001
-    quads = mesh.indices.reshape(-1, 4)
+    starts = mesh.offsets[:-1]
     out = np.zeros(mesh.face_count, dtype=np.int32)
-    out[_inside_mouth(head, lip)[quads].any(axis=1)] = MOUTH
-    out[lip[quads].all(axis=1)] = LIP
+    out[np.logical_or.reduceat(_inside_mouth(head, lip)[mesh.indices], starts)] = MOUTH
+    out[np.logical_and.reduceat(lip[mesh.indices], starts)] = LIP
     return out
 
 

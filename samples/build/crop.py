@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fba.arrays import Bools, Floats, Ints
 from fba.errors import MeshError
+from fba.mesh import PolyMesh
 from fba.scene import Role
 from samples.build.makehuman import BaseMesh
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 NECK_RING = (815, 7523)
 """An edge of the base mesh that lies in the cutting ring: front of the neck, just above the collar bones."""
@@ -31,22 +36,39 @@ NOSE_TIP = 297
 
 
 @dataclass(frozen=True)
-class HeadCrop:
-    """Which vertices and quads of the base mesh form the head without its eyeballs.
+class Part:
+    """One shape of the cropped head.
 
-    shapes : shape name -> ((n,) base vertex of each vertex, (m, 4) quads in the shape's own indices).
+    ids : (k,) base vertices that it is made of.
+    mesh : its polygons; the vertices' positions are those of the base mesh.
+    matrix : sparse (n, k), the vertices as mixtures of the base's; None where they are the same.
     """
 
-    shapes: dict[str, tuple[Ints, Ints]]
+    ids: Ints
+    mesh: PolyMesh
+    matrix: csr_array | None = None
+
+    def cut(self, values: Floats) -> Floats:
+        """The part's share (n, 3) of values over the whole body."""
+        own = values[self.ids]
+        taken: Floats = own if self.matrix is None else self.matrix @ own
+        return taken
+
+
+@dataclass(frozen=True)
+class HeadCrop:
+    """Which vertices and polygons of the base mesh form the head without its eyeballs, by shape."""
+
+    shapes: dict[str, Part]
 
     @cached_property
     def places(self) -> dict[int, tuple[str, int]]:
-        """Base vertex -> (shape, its index there)."""
-        return {int(b): (name, k) for name, (ids, _) in self.shapes.items() for k, b in enumerate(ids)}
+        """Base vertex -> (shape, its index there); shapes that were refined keep the base's vertices first."""
+        return {int(b): (name, k) for name, part in self.shapes.items() for k, b in enumerate(part.ids)}
 
     def cut(self, values: Floats) -> dict[str, Floats]:
         """Take values (19158, 3) over the whole body apart: one (n, 3) array for each shape."""
-        return {name: values[ids] for name, (ids, _) in self.shapes.items()}
+        return {name: part.cut(values) for name, part in self.shapes.items()}
 
 
 def crop_head(base: BaseMesh) -> HeadCrop:
@@ -59,7 +81,7 @@ def crop_head(base: BaseMesh) -> HeadCrop:
         ids = np.unique(quads).astype(np.int32)
         new = np.full(len(base.vertices), -1, dtype=np.int32)
         new[ids] = np.arange(ids.size)
-        shapes[name] = (ids, new[quads])
+        shapes[name] = Part(ids, PolyMesh.from_faces(base.vertices[ids], new[quads]))
     return HeadCrop(shapes)
 
 

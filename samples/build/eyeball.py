@@ -7,7 +7,6 @@ import numpy as np
 from fba.arrays import Floats
 from fba.mesh import PolyMesh
 
-SEGMENTS = 24
 PUPIL_OF_IRIS = 1.0 / 3.0
 """MPEG-4's neutral pupil: a third of the iris diameter."""
 SCLERA_RINGS = 7
@@ -15,7 +14,7 @@ SCLERA, IRIS, PUPIL = range(3)
 """Indices of the materials."""
 
 
-def eyeball(center: Floats, radius: float, iris_radius: float) -> PolyMesh:
+def eyeball(center: Floats, radius: float, iris_radius: float, segments: int) -> PolyMesh:
     """Build an eyeball that looks along +Z.
 
     Returns
@@ -26,12 +25,12 @@ def eyeball(center: Floats, radius: float, iris_radius: float) -> PolyMesh:
     pupil = float(np.arcsin(PUPIL_OF_IRIS * iris_radius / radius))
     inner = [pupil, 0.5 * (pupil + iris), iris]
     angles = np.array([*inner, *np.linspace(iris, np.pi, SCLERA_RINGS + 2)[1:-1]])
-    turn = np.arange(SEGMENTS) * 2.0 * np.pi / SEGMENTS
+    turn = np.arange(segments) * 2.0 * np.pi / segments
     rings = np.stack(
         [
             np.sin(angles)[:, None] * np.cos(turn),
             np.sin(angles)[:, None] * np.sin(turn),
-            np.broadcast_to(np.cos(angles)[:, None], (angles.size, SEGMENTS)),
+            np.broadcast_to(np.cos(angles)[:, None], (angles.size, segments)),
         ],
         axis=-1,
     )
@@ -41,16 +40,16 @@ def eyeball(center: Floats, radius: float, iris_radius: float) -> PolyMesh:
     last = angles.size - 1
 
     def at(ring: int, segment: int) -> int:
-        return 1 + ring * SEGMENTS + segment % SEGMENTS
+        return 1 + ring * segments + segment % segments
 
-    for s in range(SEGMENTS):
+    for s in range(segments):
         faces.append([0, at(0, s), at(0, s + 1)])
         materials.append(PUPIL)
     for ring in range(last):
-        for s in range(SEGMENTS):
+        for s in range(segments):
             faces.append([at(ring, s), at(ring + 1, s), at(ring + 1, s + 1), at(ring, s + 1)])
             materials.append(IRIS if ring < 2 else SCLERA)
-    for s in range(SEGMENTS):
+    for s in range(segments):
         faces.append([at(last, s), len(unit) - 1, at(last, s + 1)])
         materials.append(SCLERA)
     mesh = PolyMesh.from_faces(np.asarray(center) + radius * unit, faces)

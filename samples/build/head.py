@@ -12,11 +12,12 @@ import numpy as np
 from fba.arrays import Floats
 from fba.fapu import Fapu
 from fba.feature_points import NECK_BASE, FeaturePoint, FeaturePoints
-from fba.mesh import Material, PolyMesh
+from fba.mesh import Material
 from fba.scene import FaceScene, Role, Shape
 from fba.sphere import fit_sphere
 from samples.build.crop import PARTS, HeadCrop, crop_head
 from samples.build.eyeball import eyeball
+from samples.build.fairing import Fairing
 from samples.build.makehuman import MakeHuman
 
 POINTS_FILE = Path(__file__).with_name("makehuman_points.json")
@@ -55,6 +56,8 @@ class Head:
     body : (19158, 3) vertices of the whole MakeHuman body, decimetres.
     local : shape name -> (n, 3) corrections on top (lips closed ...), absent = none.
     placed : feature points that were placed anew on this head.
+    fairing : smooths the units of the skin; None = as they are.
+    eye_segments : of the eyeballs' rings.
     """
 
     makehuman: MakeHuman
@@ -63,6 +66,8 @@ class Head:
     name: str
     local: dict[str, Floats] = field(default_factory=dict)
     placed: dict[str, FeaturePoint] = field(default_factory=dict)
+    fairing: Fairing | None = None
+    eye_segments: int = 24
 
     @cached_property
     def parts(self) -> dict[str, Floats]:
@@ -105,13 +110,14 @@ class Head:
         """Skin, eyeballs, teeth, tongue, lashes; quads, but for the poles of the eyeballs."""
         shapes = []
         for name, role, _ in PARTS:
-            quads = self.crop.shapes[name][1]
-            mesh = PolyMesh(self.parts[name], quads.reshape(-1), np.arange(0, quads.size + 1, 4, dtype=np.int32))
+            mesh = self.crop.shapes[name].mesh.with_vertices(self.parts[name])
             shapes.append(Shape(name, mesh, role, MATERIALS[name]))
         eyes = []
         for name, role, _, _ in EYES:
             center, radius = self.eye_centers[name]
-            eyes.append(Shape(name, eyeball(center, radius, self.iris_radius), role, MATERIALS[name]))
+            eyes.append(
+                Shape(name, eyeball(center, radius, self.iris_radius, self.eye_segments), role, MATERIALS[name])
+            )
         return FaceScene((shapes[0], *eyes, *shapes[1:]), meters_per_unit=0.1, name=self.name)
 
     @cached_property
@@ -146,6 +152,8 @@ class Head:
     def unit(self, name: str) -> dict[str, Floats]:
         """Offsets of one ARKit face unit at weight 1: shape -> (n, 3); the eyeballs stay."""
         offsets = self.crop.cut(self.makehuman.target("faceunits", name))
+        if self.fairing is not None:
+            offsets["skin"] = self.fairing.smooth(offsets["skin"])
         for shape, _, _, _ in EYES:
             offsets[shape] = np.zeros((self.scene.shape(shape).mesh.vertex_count, 3))
         return offsets

@@ -19,6 +19,9 @@ where the edges of two lips with different vertices meet."""
 LIP_REACH = 0.17
 """How far from the line of contact a lip follows the correction, in ES0."""
 PASSES = 6
+SOFT_PASSES = 16
+CORNER = 0.15
+"""On a finer skin the lips meet half-way in this outer share of the mouth, whose corners curve down by themselves."""
 TONGUE_CLEARANCE = 0.02
 """The tip stays this far (ES0) behind the front of the teeth, whose strips have no thickness."""
 LASH_ROWS = 5
@@ -36,9 +39,12 @@ def neutral(head: Head, opening: float) -> Head:
     ----------
     opening : of the lids = diameter of the iris, in ES0.
     """
-    head = _lids(replace(head, placed=lid_points(head)), opening)
+    head = _lids(replace(head, placed={**head.placed, **lid_points(head)}), opening)
+    if head.fairing is not None:
+        for _ in range(SOFT_PASSES):
+            head = head.moved({"skin": head.fairing.spread(close_lips(head, soft=True))})
     for _ in range(PASSES):
-        head = head.moved({"skin": close_lips(head)})
+        head = head.moved({"skin": close_lips(head, soft=head.fairing is not None)})
     head = replace(head, placed={**head.placed, **lip_points(head)})
     return _lashes(_teeth(head))
 
@@ -77,7 +83,7 @@ def _move(head: Head, key: str, skin_offsets: Floats) -> Floats:
     return moved
 
 
-def close_lips(head: Head, motion: Floats | None = None, gaps: bool = True) -> Floats:
+def close_lips(head: Head, motion: Floats | None = None, gaps: bool = True, soft: bool = False) -> Floats:
     """Offsets (n, 3) of the skin that bring both lips into contact.
 
     Parameters
@@ -85,6 +91,7 @@ def close_lips(head: Head, motion: Floats | None = None, gaps: bool = True) -> F
     motion : (n, 3) offsets of a pose, whose lips meet half-way; None = the neutral face, whose lips meet on a level
         line at the height of the corners.
     gaps : close gaps too; False only parts lips that run through each other.
+    soft : let the corners keep their height, and fade beyond them instead of ending there.
     """
     p, fapu = head.positions, head.fapu
     skin = head.parts["skin"] if motion is None else head.parts["skin"] + motion
@@ -92,10 +99,13 @@ def close_lips(head: Head, motion: Floats | None = None, gaps: bool = True) -> F
     span = np.linspace(skin[ends[0], 0], skin[ends[1], 0], 161)[1:-1]
     sides = {name: side_mask(head, edge) for name, edge in LIPS.items()}
     lines = {name: edge_line(head, edge, sides[name], span, motion).points for name, edge in LIPS.items()}
+    half_way = 0.5 * (lines["upper"][:, 1] + lines["lower"][:, 1])
     level = np.full(span.size, 0.5 * (p["2.4"][1] + p["2.5"][1]))
     gap = lines["upper"][:, 1] - lines["lower"][:, 1]
     if motion is not None:
-        level = 0.5 * (lines["upper"][:, 1] + lines["lower"][:, 1])
+        level = half_way
+    elif soft:
+        level = half_way + smoothstep((1.0 - np.abs(span) / span[-1]) / CORNER) * (level - half_way)
     offsets = np.zeros_like(skin)
     for name, edge in LIPS.items():
         side, line = sides[name], lines[name]
@@ -103,10 +113,15 @@ def close_lips(head: Head, motion: Floats | None = None, gaps: bool = True) -> F
         if not gaps:
             shift = np.where(gap < LIP_GAP * fapu.mns0, shift, 0.0)
         x = skin[side, 0]
-        place = np.column_stack([np.interp(x, span, line[:, k]) for k in (1, 2)])
-        away = np.linalg.norm(skin[side, 1:] - place, axis=1) / (LIP_REACH * fapu.es0)
-        offsets[side, 1] = np.interp(x, span, shift, left=0.0, right=0.0) * (1.0 - smoothstep(away))
+        place = np.column_stack([np.clip(x, span[0], span[-1]) if soft else x, *_along(x, span, line)])
+        away = np.linalg.norm(skin[side] - place, axis=1) / (LIP_REACH * fapu.es0)
+        beyond = {} if soft else {"left": 0.0, "right": 0.0}
+        offsets[side, 1] = np.interp(x, span, shift, **beyond) * (1.0 - smoothstep(away))
     return offsets
+
+
+def _along(x: Floats, span: Floats, line: Floats) -> list[Floats]:
+    return [np.interp(x, span, line[:, k]) for k in (1, 2)]
 
 
 def lip_points(head: Head) -> dict[str, FeaturePoint]:

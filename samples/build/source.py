@@ -14,12 +14,15 @@ from fat.tables import table_name
 from fba.fapu import FAPU_DIVISOR
 from fba.scene import FaceScene
 from samples.build.colors import skin_materials
+from samples.build.fine import fine
 from samples.build.head import Head, build_head, macro
 from samples.build.high_level import high_level_motions
 from samples.build.low_level import RECIPES
 from samples.build.makehuman import MakeHuman
 from samples.build.motions import MotionBuilder
 from samples.build.neutral import neutral
+from samples.build.rounding import rounded
+from samples.build.symmetry import SymmetricMakeHuman
 
 RACES = {"caucasian": 0.35, "asian": 0.35, "african": 0.3}
 SEXES = {"female": 0.6, "male": 0.4}
@@ -30,13 +33,14 @@ THRUST = 40
 
 
 def source_head(makehuman: MakeHuman) -> Head:
-    """The source's neutral head: a mixture of all races and both sexes, brought to the neutral pose."""
+    """The source's neutral head: a mixture of all races and both sexes, symmetric, smooth, in the neutral pose."""
     mixture: dict[tuple[str, str], float] = {}
     for race, share in RACES.items():
         for sex, part in SEXES.items():
             for key, weight in macro(race, sex, "young", share * part).items():
                 mixture[key] = mixture.get(key, 0.0) + weight
-    return neutral(build_head(makehuman, mixture, "source"), LID_OPENING)
+    coarse = build_head(SymmetricMakeHuman(makehuman.read), mixture, "source")
+    return neutral(fine(coarse), LID_OPENING)
 
 
 def build_source(makehuman: MakeHuman) -> AnimatableFace:
@@ -47,7 +51,7 @@ def build_source(makehuman: MakeHuman) -> AnimatableFace:
     motions += eye_thrusts(head)
     motions += high_level_motions(builder)
     scene, transforms = _rig(head, colored(head))
-    tables = build_tables(scene, head.fapu, motions, transforms)
+    tables = rounded(build_tables(scene, head.fapu, motions, transforms), head.fapu)
     notes = {table_name(r.fap): r.note for r in RECIPES if r.note}
     return AnimatableFace(scene, head.points, tables, head.fapu, notes)
 

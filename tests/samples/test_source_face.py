@@ -12,8 +12,9 @@ from fat.build import face_motions
 from fat.evaluate import Player
 from fat.face import AnimatableFace
 from fat.motion import FaceMotion
+from fat.quality import mirror_map
 from fat.validate import validate
-from fba.arrays import Floats
+from fba.arrays import Floats, Ints
 from fba.faps import fap
 from fba.fapu import Fapu
 from fba.neutral import check_neutral
@@ -172,22 +173,22 @@ def test_bilabial_closes_the_lips() -> None:
 
 
 def test_sides_mirror() -> None:
-    """A left FAP is its right partner's mirror image; MakeHuman's own smile units differ a little."""
-    from scipy.spatial import cKDTree
-
+    """The head is symmetric to the last vertex and triangle; a left FAP is its right partner's mirror image."""
     face = source()
-    skin = face.scene.world_vertices("skin")
-    flip = np.array([-1.0, 1.0, 1.0])
-    distance, partner = cKDTree(skin).query(skin * flip)
-    paired = distance < 1e-3 * face.fapu.es0
-    assert paired.mean() > 0.98
+    mesh = face.scene.shape("skin").mesh
+    mirror = mirror_map(mesh.vertices, 1e-5 * face.fapu.es0)
+    assert np.array_equal(_sorted(mirror[mesh.triangles]), _sorted(mesh.triangles))
     for (number, select, value), motion in motions().items():
-        mirror = fap(number).mirror
-        if number < 3 or mirror is None or mirror < number or "skin" not in motion.offsets:
+        partner = fap(number).mirror
+        if number < 3 or partner is None or "skin" not in motion.offsets:
             continue
-        other = motions()[mirror, select, value].offsets["skin"] * flip
-        difference = np.abs(motion.offsets["skin"][paired] - other[partner[paired]]).max()
-        assert difference < 0.03 * face.fapu.es0, motion.name
+        other = motions()[partner, select, value].offsets["skin"][mirror] * [-1.0, 1.0, 1.0]
+        assert np.abs(motion.offsets["skin"] - other).max() < 1e-5 * face.fapu.es0, motion.name
+
+
+def _sorted(triangles: Ints) -> Ints:
+    rows = np.sort(triangles, axis=1)
+    return rows[np.lexsort(rows.T)]
 
 
 def test_few_triangles_turn_over() -> None:
@@ -200,7 +201,7 @@ def test_few_triangles_turn_over() -> None:
         after = _areas(mesh.vertices + motion.offsets["skin"], mesh.triangles)
         moving = np.linalg.norm(motion.offsets["skin"], axis=1)[mesh.triangles].max(axis=1) > 0.0
         shares.append(float(((before * after).sum(axis=1) < 0)[moving].mean()))
-    assert max(shares) < 0.04
+    assert max(shares) < 0.05
     assert float(np.mean(shares)) < 0.004
 
 
