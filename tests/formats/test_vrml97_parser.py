@@ -17,6 +17,7 @@ from formats.bt import read as read_bt
 from formats.vrml97 import parse, print_tree, read
 from formats.vrml97 import text as vrml_text
 from formats.vrml97.names import escape, unescape
+from formats.vrml97.numbers import read_decimals
 from formats.vrml97.printer import number_words, shortest_float32
 from formats.vrml97.references import definitions_first, unique_definitions
 from formats.vrml97.tree import (
@@ -192,6 +193,69 @@ def test_float32_are_written_as_short_as_possible_and_exact() -> None:
         return len(word.lower().split("e")[0].replace("-", "").replace(".", "").strip("0"))
 
     assert all(digits(w) <= digits(r) for w, r in zip(words, reference, strict=True))
+
+
+_words = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False, width=32).map(lambda v: repr(float(np.float32(v)))),
+    st.floats(allow_nan=False, allow_infinity=False).map(repr),
+    st.integers(-(10**20), 10**20).map(str),
+    st.from_regex(r"[+-]?([0-9]{1,12}\.?[0-9]{0,18}|\.[0-9]{1,17})([eE][+-]?[0-9]{1,3})?", fullmatch=True),
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(_words, min_size=1, max_size=60), st.sampled_from([" ", "\n", ", ", ",,\t", " \n  "]))
+def test_bulk_numbers_are_those_of_float(words: list[str], between: str) -> None:
+    found = read_decimals(between.join(words))
+    if found is not None:
+        wanted = np.array([float(w) for w in words])
+        np.testing.assert_array_equal(found.view(np.int64), wanted.view(np.int64))
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.text("0123456789.eE+-", min_size=1, max_size=12), min_size=1, max_size=8))
+def test_bulk_numbers_are_as_strict_as_float(words: list[str]) -> None:
+    found = read_decimals(" ".join([*words, *["0.5"] * 40]))
+    try:
+        wanted = [float(w) for w in words]
+    except ValueError:
+        assert found is None
+    else:
+        assert found is None or found[: len(words)].tolist() == wanted
+
+
+def test_slopes_are_read_in_bulk() -> None:
+    slopes = np.random.default_rng(1).normal(size=3000).astype(np.float32) * 10.0 ** np.arange(-9, 6).repeat(200)
+    words = number_words(shortest_float32(slopes.astype(np.float32)))
+    found = read_decimals(" ".join(words))
+    assert found is not None
+    np.testing.assert_array_equal(found.astype(np.float32), slopes.astype(np.float32))
+    assert read_decimals("") is not None
+    for wrong in ("1-2", "1.2.3", "--1", ".", "1e", "e5", "1e5.0", "1ee5", "0x10", "+I", "1:2", "\xe9", "1 2 3/"):
+        assert read_decimals(wrong) is None
+
+
+@pytest.mark.parametrize(
+    ("word", "said"), [("1.2.3", "'1.2.3'"), ("1-2", "'1-2'"), ("--4", "'--4'"), (".", "'.'"), ("7e", "'7e'")]
+)
+def test_a_wrong_word_among_many_numbers_is_found(word: str, said: str) -> None:
+    numbers = "\n".join(["0.125 -3e-05 17 .5,"] * 2000)
+    text = f"Coordinate {{ point [\n{numbers}\n0 {word} 1\n{numbers} ] }}"
+    with pytest.raises(VrmlSyntaxError, match="expected a number") as caught:
+        parse(text)
+    assert (caught.value.line, caught.value.column) == (2002, 3)
+    assert said in str(caught.value)
+
+
+def test_rare_numbers_among_many_keep_their_value() -> None:
+    words = ["0x1F", "+I", "1e400", "-0", "5e-324", "12345678901234567890"]
+    numbers = " ".join(["0.125 -3e-05 17 .5,"] * 2000)
+    (tree,) = parse(f"A {{ b [ {numbers} {' '.join(words)} # a comment 1 2 3\n {numbers} ] }}")
+    assert isinstance(tree, VrmlNode)
+    value = tree.get("b")
+    assert isinstance(value, Numbers)
+    assert value.values[8000:8006].tolist() == [31, np.inf, np.inf, 0, 5e-324, 12345678901234567890.0]
+    assert value.values.size == 16006
 
 
 @pytest.mark.parametrize("name", ["a", "left eye", "9.3", "DEF", "a_x20_b", "ö", "", "_x", "頭", "a.b[c]{d}\"#'"])
