@@ -1,7 +1,8 @@
-"""Draw the pictures of the documentation: ``python docs/make_images.py``."""
+"""Draw the pictures of the documentation: ``python docs/make_images.py [hero|faps]...``, everything by default."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from cloning import clone
@@ -10,8 +11,9 @@ from fba.high_level import BLEND_MAX
 from formats import read_face, read_scene
 from formats.landmarks import read_landmarks
 from samples import sample
+from studio.fap_sheet import fap_sheets
 from studio.render import Figure, make_renderer
-from studio.sheet import PosePick, Sheet
+from studio.sheet import PosePick, Sheet, save_png
 
 FOLDER = Path(__file__).resolve().parent / "images"
 HEADS = (("tri_head", "triangles"), ("quad_head", "quads"), ("closed_head", "one closed skin"))
@@ -27,7 +29,7 @@ POSES = (
 )
 
 
-def main() -> None:
+def hero() -> None:
     """Source above three clones."""
     source = read_face("default")
     faces = [("source", source)]
@@ -45,9 +47,22 @@ def main() -> None:
         ]
         captions = [p.caption for p in POSES] if index == len(faces) - 1 else ()
         sheet.add_row(label, pictures, captions)
-    FOLDER.mkdir(exist_ok=True)
     sheet.save(FOLDER / "hero.png")
 
 
+def faps() -> None:
+    """The reference sheet of the shipped source, one picture for each region: docs/faps.md."""
+    for sheet in fap_sheets(read_face("default"), make_renderer("software")):
+        save_png(sheet.image, FOLDER / f"faps_{sheet.name}.png")
+
+
+def main(*wanted: str) -> None:
+    """Draw these pictures; all without names."""
+    FOLDER.mkdir(exist_ok=True)
+    pictures = {"hero": hero, "faps": faps}
+    for name in wanted or pictures:
+        pictures[name]()
+
+
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

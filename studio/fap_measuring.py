@@ -78,7 +78,7 @@ class _Skin:
 class _Measurer:
     def __init__(self, face: AnimatableFace) -> None:
         self.face = face
-        self.player = Player(face)
+        self.player = Player(face, rules=())
         self.rest = self.player.pose().world_shapes()
         self.points = face.feature_points.positions(face.scene, self.rest)
         self.probe = Probe(face, self.rest)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from studio.cli.arguments import AsJson, FacePath
-from studio.cli.outcome import Outcome
+from studio.cli.outcome import Outcome, usage
 
 if TYPE_CHECKING:
+    from fat.face import AnimatableFace
     from fat.fap_quality import FapQuality
     from studio.checking import CheckResult
 
@@ -37,6 +39,9 @@ def check(
         str | None, typer.Option(help="The face it was cloned from ('default'): compare every motion.")
     ] = None,
     worst: Annotated[bool, typer.Option(help="Show the worst motions first.")] = False,
+    sheet: Annotated[
+        Path | None, typer.Option(help="Also draw every FAP, viseme and expression into this .png.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Check conformance and quality of every FAP, viseme and expression; ends with 1 when something fails."""
@@ -44,13 +49,35 @@ def check(
     from studio.checking import check_face, check_file
     from studio.cli.console import print_json
 
-    result = check_face(read_face(str(face)), None if source is None else read_face(source), check_file(face))
+    if sheet is not None:
+        _check_sheet(sheet)
+    animatable = read_face(str(face))
+    result = check_face(animatable, None if source is None else read_face(source), check_file(face))
+    if sheet is not None and not any(f.severity == "error" for f in result.findings):
+        _draw(animatable, sheet)
     if as_json:
         print_json({"file": str(face), **result.to_dict()})
     else:
         _print(result, worst)
     if not result.passed:
         raise typer.Exit(Outcome.FINDINGS)
+
+
+def _check_sheet(path: Path) -> None:
+    from formats.files import require_folder
+
+    if path.suffix.lower() != ".png":
+        usage(f"--sheet {path}: the reference sheet is a .png")
+    require_folder(path)
+
+
+def _draw(face: AnimatableFace, path: Path) -> None:
+    from studio.cli.console import progress
+    from studio.fap_sheet import fap_sheets, tall_sheet
+    from studio.sheet import save_png
+
+    with progress() as tell:
+        save_png(tall_sheet(fap_sheets(face, progress=tell)), path)
 
 
 def _print(result: CheckResult, worst: bool) -> None:
