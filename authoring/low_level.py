@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from authoring import jaw
+from authoring import jaw, lids
 from authoring.construct import construct
 from authoring.construction import Offsets
 from authoring.from_units import UnitMaker, UnitMotion
-from authoring.recipes import CONSTRUCTED_FIRST, RECIPES
+from authoring.recipes import RECIPES, UNITS_FIRST
 from authoring.report import How, Step
 from authoring.units import FaceShapes, Given
 from cloning.prepare import PreparedFace
@@ -19,6 +19,12 @@ from fba.faps import Fap, fap
 from fba.findings import Finding
 
 JAW = 3
+
+ARCS: Mapping[int, Sequence[int]] = {
+    JAW: jaw.OPEN_BORDERS,
+    **{number: made.borders for number, made in lids.CONSTRUCTIONS.items()},
+}
+"""FAPs that go along an arc, whatever shows them -> the borders that keep to it. One unit shows both directions."""
 
 MOST_SCALED = 4.0
 """A given shape that would have to be scaled more than this (or its inverse) to show its value is left as it is."""
@@ -61,8 +67,8 @@ class LowLevel:
         return Made(motions, tuple(step for _, (_, step) in rows), tuple(dict.fromkeys(why)), tuple(findings))
 
     def _side(self, entry: Fap, sign: int, found: dict[int, tuple[Offsets, Step]], why: list[str]) -> None:
-        ways = [self._from_units, self._constructed]
-        if entry.id in CONSTRUCTED_FIRST:
+        ways = [self._constructed, self._from_units]
+        if entry.id in UNITS_FIRST:
             ways.reverse()
         for way in ways:
             made = way(entry, sign)
@@ -111,7 +117,7 @@ class LowLevel:
 
     def _from_units(self, entry: Fap, sign: int) -> dict[int, tuple[Offsets, Step]] | str:
         recipe = RECIPES.get(entry.id)
-        borders = [b for b in recipe.borders if b.value * sign > 0] if recipe else []
+        borders = [b for b in recipe.borders if b.value * sign > 0 or entry.id in ARCS] if recipe else []
         if recipe is None or not borders:
             return f"no unit shows {entry.name} {'below' if sign < 0 else 'above'} zero"
         out: dict[int, tuple[Offsets, Step]] = {}
@@ -119,16 +125,17 @@ class LowLevel:
             made = self.maker.border(recipe, border)
             if isinstance(made, str):
                 return made
-            out.update(self._steps(entry, made))
-        return out
+            out.update(self._steps(entry.id, sign, made))
+        return out or f"the unit of {entry.name} cannot be bent below zero"
 
-    def _steps(self, entry: Fap, made: UnitMotion) -> dict[int, tuple[Offsets, Step]]:
+    def _steps(self, fap_id: int, sign: int, made: UnitMotion) -> dict[int, tuple[Offsets, Step]]:
         """The borders of one unit's motion: jaws turn and lids slide, in steps; all else goes straight."""
-        rows: Mapping[int, Offsets] = {made.value: made.offsets}
-        values = curved_values(entry.id, made.value)
-        if values and made.parts:
-            unit = self.maker.units.get(next(iter(made.parts)))
-            rows = curved(self.face, values, unit)
+        rows: Mapping[int, Offsets] = {}
+        if fap_id in ARCS:
+            values = [b for b in ARCS[fap_id] if b * sign > 0]
+            rows = _bent(self.face, fap_id, values, self.maker.units.get(next(iter(made.parts))))
+        if not rows and made.value * sign > 0:
+            rows = {made.value: made.offsets}
         return {
             value: (offsets, Step(value, "units", self._named(made.parts, value / made.value)))
             for value, offsets in rows.items()
@@ -149,13 +156,8 @@ class LowLevel:
         return "; ".join(f.message for f in findings) or f"the construction of {entry.name} has no such side"
 
 
-def curved_values(fap_id: int, value: int) -> tuple[int, ...]:
-    """Borders of a FAP whose unit is bent onto an arc; none for all others."""
-    if fap_id == JAW:
-        return tuple(b for b in jaw.OPEN_BORDERS if b * value > 0)
-    return ()
-
-
-def curved(face: PreparedFace, values: Sequence[int], unit: Offsets | None) -> Mapping[int, Offsets]:
+def _bent(face: PreparedFace, fap_id: int, values: Sequence[int], unit: Offsets | None) -> Mapping[int, Offsets]:
     """A motion on an arc at several values, after the unit that shows how the skin follows it."""
-    return jaw.open_jaw(face, values, unit)
+    if fap_id == JAW:
+        return jaw.open_jaw(face, values, unit)
+    return lids.close_lid(face, fap_id, values, unit)

@@ -107,9 +107,7 @@ def _sided(k: int, side: str) -> list[Recipe]:
         Recipe(53 + k, stretched, (inner,), judged=inner),
         Recipe(12 + k, raised, (outer,)),
         Recipe(59 + k, raised, (inner,), judged=inner),
-        Recipe(
-            19 + k, (Border(-350, ({f"eyeWide{side}": 1.0},)), Border(1024, ({f"eyeBlink{side}": 1.0},))), carried=LIDS
-        ),
+        Recipe(19 + k, (Border(1024, ({f"eyeBlink{side}": 1.0},)),), carried=LIDS),
         Recipe(21 + k, (Border(512, ({f"eyeSquint{side}": 1.0},)),), carried=LIDS),
         *(
             Recipe(f, (Border(-100, down, BROWS), Border(value, mixes, BROWS)), carried=LIDS)
@@ -127,14 +125,11 @@ RECIPES: dict[int, Recipe] = {
     for recipe in (
         Recipe(3, (Border(1024, ({"jawOpen": 1.0},)),), carried=JAW, whole=True),
         Recipe(14, (Border(500, ({"jawForward": 1.0},)),), carried=JAW, whole=True),
-        Recipe(15, (Border(-300, ({"jawLeft": 1.0},)), Border(300, ({"jawRight": 1.0},))), carried=JAW, whole=True),
-        Recipe(16, (Border(500, ({"mouthPucker": 1.0}, {"mouthFunnel": 1.0}), MIDLIPS),)),
         Recipe(
-            17,
-            (
-                Border(-400, ({"mouthRollUpper": 1.0},)),
-                Border(500, ({"mouthFunnel": 1.0}, {"mouthPucker": 1.0}), MIDLIPS),
-            ),
+            15,
+            (Border(-300, ({"jawLeft": 1.0},)), Border(300, ({"jawRight": 1.0},))),
+            carried=(*LOWER_LIP, *LIP_CORNERS, "2.1", "2.10"),
+            whole=True,
         ),
         *_contours(),
         *_sided(0, "Left"),
@@ -143,5 +138,8 @@ RECIPES: dict[int, Recipe] = {
 }
 """FAP -> recipe."""
 
-CONSTRUCTED_FIRST = frozenset((4, 5, 8, 9, 10, 11, 51, 52, 55, 56, 57, 58, *range(33, 39), 39, 40))
-"""FAPs whose construction is better than a unit shared out: single lip points, brow points, cheeks."""
+UNITS_FIRST = frozenset((3, 19, 20, 21, 22, 29, 30))
+"""FAPs for which a unit is better than a construction: opening jaw and lids, whose spread over the skin a modeller knows
+and pupils. Everywhere else the unit of a face kit moves many feature points at once; what is left of it when only one
+may move folds the lips and kinks the brows, while constructions stay smooth. Judged by looks on the ICT-FaceKit and
+MakeHuman units; the units themselves show in visemes and expressions."""
