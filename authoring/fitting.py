@@ -22,8 +22,14 @@ PointAxis = tuple[str, int]
 CLEARANCE = 0.01
 """Skin that lies on an eyeball stays this far off it, in radii, or as far as it is at rest."""
 
-BURIED = -0.01
-"""Skin deeper in the eyeball than this at rest, in radii, is the inside of the socket."""
+BURIED = -0.25
+"""Skin deeper in the eyeball than this at rest, in radii, is the back of the socket."""
+
+BEHIND = -0.1
+"""Skin farther behind the middle of the eyeball than this, in radii, is beside it and cannot come in front."""
+
+PASSES = 3
+"""The cornea stands out: skin that is pushed forward lies before another place of the ball."""
 
 NOISE = 3e-4
 """Offsets below this length (eye separations) are what is left of a local correction far away; they become 0."""
@@ -92,17 +98,19 @@ class Fitting:
         return {name: part for name, part in out.items() if part.any()}
 
     def off_eyeballs(self, skin: Floats) -> Floats:
-        """The skin (n, 3) pushed forward where it would sink into an eyeball; heights stay."""
+        """The skin (n, 3) pushed forward where it would get deeper into an eyeball than at rest; heights stay."""
         out = np.array(skin)
         for ball in self._balls:
             local = ball.rest - ball.center
-            clear = ball.clearance(local)
-            moved = local + skin[ball.vertices]
-            needed = ball.radius(moved) * (1.0 + np.minimum(clear, CLEARANCE))
-            front = np.sqrt(np.maximum(needed**2 - moved[:, 0] ** 2 - moved[:, 1] ** 2, 0.0))
-            covers: Bools = (clear > BURIED) & (local[:, 2] > 0.0) & skin[ball.vertices].any(axis=1)
-            enters = covers & (moved[:, 2] < front) & (moved[:, 2] > 0.0)
-            out[ball.vertices[enters], 2] += (front - moved[:, 2])[enters]
+            rest = ball.clearance(local)
+            covers: Bools = (rest > BURIED) & (local[:, 2] > 0.0) & skin[ball.vertices].any(axis=1)
+            ids, kept = ball.vertices[covers], np.minimum(rest[covers], CLEARANCE)
+            for _ in range(PASSES):
+                moved = local[covers] + out[ids]
+                needed = ball.radius(moved) * (1.0 + kept)
+                front = np.sqrt(np.maximum(needed**2 - moved[:, 0] ** 2 - moved[:, 1] ** 2, 0.0))
+                before = moved[:, 2] > BEHIND * needed
+                out[ids, 2] += np.where(before & (front > 0.0), np.maximum(front - moved[:, 2], 0.0), 0.0)
         return out
 
     @cached_property

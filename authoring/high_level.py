@@ -10,7 +10,7 @@ import numpy as np
 from authoring.construction import Offsets
 from authoring.contact import Lips
 from authoring.fitting import Fitting
-from authoring.poses import CLOSED, EXPRESSION_POSES, STAND_INS, VISEME_POSES
+from authoring.poses import CLOSED, EXPRESSION_POSES, VISEME_POSES, stand_in
 from authoring.report import Step
 from authoring.units import FaceShapes, added
 from fat.evaluate import Player
@@ -67,7 +67,7 @@ class HighLevel:
                 for shape in self.shapes.units.sources(name):
                     parts[shape] = max(weight, parts.get(shape, 0.0))
                 continue
-            known = {k: weight * v for k, v in STAND_INS[name].items() if self.player.face.tables.get(k) is not None}
+            known = {k: weight * v for k, v in stand_in(name).items() if self.player.face.tables.get(k) is not None}
             if not known:
                 absent.append(name)
             for number, value in known.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from authoring.recipes import both
+from fat.profiles.tables import profile_table
 
 TONGUE_UP = "tongueUp"
 """Name of a pose's own unit beside ARKit's: the front of the tongue behind the upper teeth (FAPs 44 and 45)."""
@@ -73,33 +74,20 @@ EXPRESSION_POSES: dict[str, dict[str, float]] = {
 }
 
 
-def _mirrored(stem: str, left: Mapping[int, int], right: Mapping[int, int]) -> dict[str, dict[int, int]]:
-    return {f"{stem}Left": dict(left), f"{stem}Right": dict(right)}
-
-
-STAND_INS: dict[str, dict[int, int]] = {
-    "jawOpen": {3: 1100},
-    "mouthFunnel": {16: 350, 17: 350, 51: -150, 52: -250, 4: -150, 5: -250, 53: -120, 54: -120},
-    "mouthPucker": {16: 450, 17: 450, 53: -200, 54: -200},
-    "mouthRollLower": {16: -250, 5: 60},
-    "mouthRollUpper": {17: -250, 4: 60},
-    "mouthShrugLower": {18: 120, 52: 80},
-    "tongueOut": {45: 500},
+_MORE: dict[str, dict[int, float]] = {
     TONGUE_UP: {44: 450, 45: 40},
-    **_mirrored("mouthPress", {10: 30, 8: 30}, {11: 30, 9: 30}),
-    **_mirrored("mouthUpperUp", {8: -220, 55: -220, 4: -90, 51: -90}, {9: -220, 56: -220, 4: -90, 51: -90}),
-    **_mirrored("mouthLowerDown", {10: -220, 57: -220, 5: -90, 52: -90}, {11: -220, 58: -220, 5: -90, 52: -90}),
-    **_mirrored("mouthStretch", {53: 130, 59: -60}, {54: 130, 60: -60}),
-    **_mirrored("mouthSmile", {59: 450, 53: 110, 41: 60}, {60: 450, 54: 110, 42: 60}),
-    **_mirrored("mouthFrown", {59: -300}, {60: -300}),
-    **_mirrored("cheekSquint", {41: 140}, {42: 140}),
-    **_mirrored("eyeSquint", {21: 300}, {22: 300}),
-    **_mirrored("eyeBlink", {19: 1024}, {20: 1024}),
-    **_mirrored("eyeWide", {19: -350}, {20: -350}),
-    **_mirrored("browInnerUp", {31: 120, 33: 40}, {32: 120, 34: 40}),
-    "browInnerUp": {31: 120, 33: 40, 32: 120, 34: 40},
-    **_mirrored("browOuterUp", {35: 90, 33: 90}, {36: 90, 34: 90}),
-    **_mirrored("browDown", {31: -80, 33: -60, 37: 90}, {32: -80, 34: -60, 38: 90}),
-    **_mirrored("noseSneer", {61: 60, 55: -90}, {62: 60, 56: -90}),
+    "tongueOut": {45: 500},
+    "browInnerUpLeft": {31: 120, 33: 40},
+    "browInnerUpRight": {32: 120, 34: 40},
 }
-"""Unit -> FAP values of about its size, for faces that have no such unit."""
+"""What stands in for units that ARKit does not have or that no FAP was fitted to."""
+
+
+def stand_in(unit: str) -> Mapping[int, float]:
+    """FAP -> value of about the size of a unit, for faces that have no such unit; empty where there is nothing.
+
+    >>> stand_in("jawOpen").keys()
+    dict_keys([3])
+    """
+    fitted = {shape.name: shape.faps for shape in profile_table("arkit")}
+    return fitted.get(unit) or _MORE.get(unit, {})

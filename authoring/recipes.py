@@ -139,7 +139,7 @@ RECIPES: dict[int, Recipe] = {
 """FAP -> recipe."""
 
 UNITS_FIRST = frozenset((3, 19, 20, 21, 22, 29, 30))
-"""FAPs for which a unit is better than a construction: opening jaw and lids, whose spread over the skin a modeller knows
+"""FAPs for which a unit is better than a construction: opening jaw and lids, whose spread over the skin modellers know,
 and pupils. Everywhere else the unit of a face kit moves many feature points at once; what is left of it when only one
 may move folds the lips and kinks the brows, while constructions stay smooth. Judged by looks on the ICT-FaceKit and
 MakeHuman units; the units themselves show in visemes and expressions."""
