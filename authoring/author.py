@@ -198,7 +198,7 @@ def _notes(made: Mapping[int, Made], open_jaw: OpenJaw) -> dict[str, str]:
 
 
 def _strict(face: AnimatableFace) -> AnimatableFace:
-    from fat.open_jaw import strict
+    from authoring.open_jaw import strict
 
     return replace(strict(face), notes={**face.notes, "open_jaw": "strict"})
 
