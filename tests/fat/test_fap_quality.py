@@ -96,7 +96,7 @@ def test_what_carries_everything_has_no_cross_talk() -> None:
         ({"cross_talk": 0.06}, "cross-talk"),
         ({"flips": 0.01}, "flips"),
         ({"flips_at_limit": 0.6}, "flips-at-limit"),
-        ({"stretch": 4.5}, "tear"),
+        ({"stretch": 5.5}, "tear"),
         ({"parted": 1}, "seam"),
         ({"penetration": 0.3}, "penetration"),
     ],
