@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from authoring.bump_motion import BumpMotion
 from authoring.bumps import Place
 from authoring.construction import Construction
-from authoring.curves import rim_places
+from authoring.curves import brow_places, rim_places
 from cloning.prepare import PreparedFace
 
 BORDERS = (-900, -600, -300, 300, 600, 900)
@@ -23,9 +23,16 @@ def _lids(face: PreparedFace, _: Mapping[str, float]) -> list[Place]:
     return rim_places(face)
 
 
+def _brow(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
+    return [*rim_places(face), *brow_places(face, values)]
+
+
 _MOTIONS = (
-    *(BumpMotion(k, BORDERS, _EYES[(k + 1) % 2], REACH, slides=True, shape=_lids) for k in range(31, 37)),
-    *(BumpMotion(k, BORDERS, _EYES[(k + 1) % 2], REACH, pins=_MIDDLES, slides=True, shape=_lids) for k in (37, 38)),
+    *(BumpMotion(k, BORDERS, _EYES[(k + 1) % 2], REACH, slides=True, carries=True, shape=_brow) for k in range(31, 37)),
+    *(
+        BumpMotion(k, BORDERS, _EYES[(k + 1) % 2], REACH, pins=_MIDDLES, slides=True, carries=True, shape=_lids)
+        for k in (37, 38)
+    ),
 )
 
 CONSTRUCTIONS: Mapping[int, Construction] = {m.fap_id: m.construction for m in _MOTIONS}

@@ -13,16 +13,17 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from authoring.bumps import Bumps, Goals, Place, bumps, pinned
+from authoring.bumps import Bumps, Goals, Patch, Place, bumps, pinned
 from authoring.carried import carrier
+from authoring.clearance import before_eyeballs
 from authoring.construction import Construction, Offsets
 from authoring.riders import skin_offsets
 from authoring.sliding import fit_round
 from cloning.prepare import PreparedFace
-from fba.arrays import Bools, Floats
+from fba.arrays import Floats
 from fba.faps import fap
 
-STEP = 0.15
+STEP = 0.2
 """Longest step, as a share of the bump's radius: bumps are no steeper than about 4 in a radius, so none folds."""
 
 LEVEL = 1e-9
@@ -97,7 +98,8 @@ class BumpMotion:
                     shift = shift + (length / steps) * weight[:, None] * way
                     field = ground.slide(rest, shift) if ground else shift
                 reached = border
-                yield border, bump.level(field) if ground else field
+                done = bump.level(field) if ground else field
+                yield border, before_eyeballs(face, done)
 
     def _way(self, face: PreparedFace, sign: int) -> Floats:
         """(3,) where the skin goes as the value rises above or falls below 0; 1 along the FAP's axis."""
@@ -120,7 +122,7 @@ class BumpMotion:
         pins = [k for axis in range(3) if way[axis] for k in pinned(axis, tuple(wanted))]
         more = [] if self.shape is None else self.shape(face, wanted)
         goals = maker.goals(wanted, [*pins, *self.pins], more)
-        return _Bump(maker, goals, free, radius, carrier(face) if self.carries else None)
+        return _Bump(maker, goals, maker.patch(free), radius, carrier(face) if self.carries else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,20 +132,20 @@ class _Bump:
     Attributes
     ----------
     goals : what it must be at places.
-    free : (n,) bool, the skin that may move.
+    patch : the skin that may move.
     radius : in eye separations.
     carry : what hidden skin does, see `carrier`; None if it goes its own way.
     """
 
     maker: Bumps
     goals: Goals
-    free: Bools
+    patch: Patch
     radius: float
     carry: Any | None
 
     def weight(self, places: Floats) -> Floats:
         """The bump (n,) of the skin as it lies by now."""
-        weight = self.maker.weight(self.goals, self.free, places)
+        weight = self.patch.weight(self.goals, places)
         return weight if self.carry is None else self.carry @ weight
 
     def level(self, field: Floats) -> Floats:
@@ -154,7 +156,7 @@ class _Bump:
             return field
         goals = self.maker.goals({k: float(d) for k, d in zip(keys, deep, strict=True)})
         leveled = field.copy()
-        leveled[:, 2] -= self.maker.weight(goals, self.free)
+        leveled[:, 2] -= self.patch.weight(goals, self.maker.surface.vertices)
         return leveled
 
 

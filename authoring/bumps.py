@@ -105,38 +105,25 @@ class Bumps:
             near |= side & np.isfinite(self.surface.distances([key], radius, ~side)[0])
         return near
 
-    def weight(self, goals: Goals, free: Bools, lying: Floats | None = None) -> Floats:
-        """The smoothest weight (n,) with given values at places of the skin.
-
-        Parameters
-        ----------
-        goals : where, and the weight there.
-        free : (n,) bool, the skin that may move; the weight is 0 elsewhere and ends without a slope.
-        lying : (n, 3) where the skin lies by now, in eye separations; None at rest.
-        """
-        from scipy.sparse.linalg import splu
-
-        count = int(self._group.max()) + 1
-        held = np.zeros(count, dtype=bool)
+    def patch(self, free: Bools) -> Patch:
+        """The part of the skin that may move: (n,) bool. Weights are 0 elsewhere and end without a slope."""
+        triangles, share = self._fans
+        corners = self._group[triangles]
+        held = np.zeros(int(self._group.max()) + 1, dtype=bool)
         held[self._group[~free]] = True
         places = np.flatnonzero(~held).astype(np.int32)
-        values = np.zeros(count)
-        rows = goals.rows[:, places]
-        touched = np.asarray(abs(rows).sum(axis=1)).ravel() > UNTOUCHED
-        if not touched.any():
-            return values[self._group]
-        rows, wanted = rows[touched].toarray(), goals.values[touched]
-        system = self._bending(places, self.surface.vertices if lying is None else lying)
-        follow = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(
-            np.ascontiguousarray(rows.T)
+        inside = ~held
+        inside[corners[inside[corners].any(axis=1)]] = True
+        used = inside[corners].any(axis=1)
+        around, local = np.unique(corners[used], return_inverse=True)
+        return Patch(
+            self._group,
+            places,
+            triangles[used],
+            share[used],
+            local.reshape(-1, 3).astype(np.int32),
+            np.searchsorted(around, places).astype(np.int32),
         )
-        between = rows @ follow
-        size = np.sqrt(np.diag(between))
-        between = between / np.outer(size, size) + np.diag(goals.softness[touched])
-        heights = np.linalg.lstsq(between, wanted / size, rcond=DEPENDENT)[0] / size
-        values[places] = follow @ heights
-        weight: Floats = values[self._group]
-        return weight
 
     def goals(self, wanted: Mapping[str, float], pins: Collection[str] = (), more: Sequence[Place] = ()) -> Goals:
         """Put goals together.
@@ -160,20 +147,61 @@ class Bumps:
         rows = (vstack([self.surface.point_matrix(keys), extra]) @ spread).tocsr()
         return Goals(rows, np.array(values), np.repeat([0.0, SOFT], [len(keys), len(more)]))
 
-    def _bending(self, places: Ints, vertices: Floats) -> Any:
-        """(k, k) sparse: ``w @ bending @ w`` is the bending of a weight over these places, 0 around them."""
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A part of the skin that may move, and how it bends.
+
+    Attributes
+    ----------
+    group : (n,) the place of each vertex.
+    places : (k,) the places that may move.
+    triangles : (t, 3) those that bend with them; share : (t,) with which each counts.
+    corners : (t, 3) their corners, numbered among the places around; columns : (k,) the moving ones among these.
+    """
+
+    group: Ints
+    places: Ints
+    triangles: Ints
+    share: Floats
+    corners: Ints
+    columns: Ints
+
+    def weight(self, goals: Goals, lying: Floats) -> Floats:
+        """The smoothest weight (n,) with given values at places of the skin.
+
+        Parameters
+        ----------
+        goals : where, and the weight there.
+        lying : (n, 3) where the skin lies, in eye separations.
+        """
+        from scipy.sparse.linalg import splu
+
+        values = np.zeros(int(self.group.max()) + 1)
+        rows = goals.rows[:, self.places]
+        touched = np.asarray(abs(rows).sum(axis=1)).ravel() > UNTOUCHED
+        if not touched.any():
+            return values[self.group]
+        rows, wanted = rows[touched].toarray(), goals.values[touched]
+        factors = splu(
+            self._bending(lying), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+        follow = factors.solve(np.ascontiguousarray(rows.T))
+        between = rows @ follow
+        size = np.sqrt(np.diag(between))
+        between = between / np.outer(size, size) + np.diag(goals.softness[touched])
+        heights = np.linalg.lstsq(between, wanted / size, rcond=DEPENDENT)[0] / size
+        values[self.places] = follow @ heights
+        weight: Floats = values[self.group]
+        return weight
+
+    def _bending(self, lying: Floats) -> Any:
+        """(k, k) sparse: ``w @ bending @ w`` is the bending of a weight over the places, 0 around them."""
         from scipy.sparse import csc_array, diags_array
 
-        triangles, share = self._fans
-        corners = self._group[triangles]
-        inside = np.zeros(int(self._group.max()) + 1, dtype=bool)
-        inside[places] = True
-        inside[corners[inside[corners].any(axis=1)]] = True
-        used = inside[corners].any(axis=1)
-        around, local = np.unique(corners[used], return_inverse=True)
-        stretch, area = _stiffness(vertices[triangles[used]], share[used], local.reshape(-1, 3).astype(np.int32))
+        stretch, area = _stiffness(lying[self.triangles], self.share, self.corners)
         inverse = diags_array(1.0 / np.maximum(area, SMALLEST * float(area.mean())))
-        columns = stretch.tocsc()[:, np.searchsorted(around, places)]
+        columns = stretch.tocsc()[:, self.columns]
         return csc_array(columns.T @ inverse @ columns)
 
 
@@ -208,8 +236,9 @@ def _stiffness(places: Floats, share: Floats, corners: Ints) -> tuple[Any, Float
     for k in range(3):
         apex, a, b = (places[:, (k + s) % 3] for s in range(3))
         u, v = a - apex, b - apex
-        cross = np.linalg.norm(np.cross(u, v), axis=1)
-        cotangent = np.einsum("ij,ij->i", u, v) / np.maximum(cross, 1e-12)
+        along = (u * v).sum(axis=1)
+        cross = np.sqrt(np.maximum((u * u).sum(axis=1) * (v * v).sum(axis=1) - along**2, 0.0))
+        cotangent = along / np.maximum(cross, 1e-12)
         rows.append(corners[:, (k + 1) % 3])
         columns.append(corners[:, (k + 2) % 3])
         values.append(0.5 * share * np.clip(cotangent, -STEEPEST, STEEPEST))

@@ -6,14 +6,16 @@ is, and the outer skin would run through it.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from cloning.prepare import PreparedFace
+from cloning.surface import Surface
 from cloning.visibility import visible
-from fba.arrays import Floats
+from fba.arrays import Bools, Floats
 
 NEIGHBOURS = 12
 """Vertices of the outer skin whose motions a hidden vertex takes the mean of."""
@@ -21,6 +23,14 @@ NEIGHBOURS = 12
 BEHIND = (0.2, 0.6)
 """Hidden skin up to the first distance behind the outer one (eye separations) goes all the way along, beyond the
 second not at all: a cheek is about 0.25 thick."""
+
+
+DEEP = (0.03, 0.15)
+"""Hidden skin nearer than the first distance to what can be seen, along the skin, moves with it as one: the red of the
+lips behind their contact, the rims of lids and nostrils. Beyond the second it is lining."""
+
+VIEWS = 7
+"""Directions that the face is seen from: ahead, above, below, and half a radian to both sides."""
 
 
 def carrier(face: PreparedFace) -> Any:
@@ -35,23 +45,39 @@ _MADE: WeakKeyDictionary[PreparedFace, Any] = WeakKeyDictionary()
 
 def _carrier(face: PreparedFace) -> Any:
     from scipy.sparse import csr_array, diags_array
+    from scipy.sparse.csgraph import dijkstra
     from scipy.spatial import cKDTree
 
     places = face.skin.vertices
-    seen = visible(face.skin)
+    seen = _seen(face.skin)
     outer, hidden = np.flatnonzero(seen), np.flatnonzero(~seen)
     if not len(outer) or not len(hidden):
         return diags_array(np.ones(len(places)))
     found = cKDTree(places[outer]).query(places[hidden], k=min(NEIGHBOURS, len(outer)))
     away, near = (np.asarray(part).reshape(len(hidden), -1) for part in found)
     share = 1.0 / np.maximum(away, 1e-6) ** 2
-    share *= (_fade(away[:, 0]) / share.sum(axis=1))[:, None]
+    inside = dijkstra(face.skin.graph, indices=outer, min_only=True, limit=DEEP[1])[hidden]
+    deep = _rise(inside, DEEP)
+    share *= (deep * (1.0 - _rise(away[:, 0], BEHIND)) / share.sum(axis=1))[:, None]
     rows = np.repeat(hidden, near.shape[1])
     carried = csr_array((share.ravel(), (rows, outer[near].ravel())), shape=(len(places), len(places)))
-    return (diags_array(seen.astype(np.float64)) + carried).tocsr()
+    own = np.ones(len(places))
+    own[hidden] -= deep
+    return (diags_array(own) + carried).tocsr()
 
 
-def _fade(away: Floats) -> Floats:
-    t = np.clip((away - BEHIND[0]) / (BEHIND[1] - BEHIND[0]), 0.0, 1.0)
-    fade: Floats = 1.0 - t * t * (3.0 - 2.0 * t)
-    return fade
+def _seen(skin: Surface) -> Bools:
+    """(n,) what can be seen from before the face, the same on both sides of a symmetric one.
+
+    Seen is what is seen on the face or on its mirror image: near the edge of sight the cells of the picture decide.
+    """
+    mirrored = replace(skin, vertices=skin.vertices * [-1.0, 1.0, 1.0], triangles=skin.triangles[:, ::-1])
+    seen: Bools = visible(skin, VIEWS) | visible(mirrored, VIEWS)
+    return seen
+
+
+def _rise(length: Floats, ends: tuple[float, float]) -> Floats:
+    """Smoothly from 0 at the first end to 1 at the second."""
+    t = np.clip((length - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
+    rise: Floats = t * t * (3.0 - 2.0 * t)
+    return rise

@@ -13,7 +13,7 @@ from cloning.prepare import PreparedFace
 PUFF_BORDERS = (-900, -600, -300, 300, 600, 900)
 LIFT_BORDERS = (300, 600)
 
-PUFF, LIFT = 1.6, 1.6
+PUFF, LIFT = 2.0, 2.6
 """Reach in eye widths: a puffed cheek from the cheekbone to the jaw, a lifted one from the lower lid to the mouth."""
 
 _EYES = (("3.7", "3.11"), ("3.8", "3.12"))
@@ -25,7 +25,7 @@ def _lids(face: PreparedFace, _: Mapping[str, float]) -> list[Place]:
 
 _MOTIONS = (
     *(BumpMotion(k, PUFF_BORDERS, _EYES[(k + 1) % 2], PUFF, bulges=True, carries=True) for k in (39, 40)),
-    *(BumpMotion(k, LIFT_BORDERS, _EYES[(k + 1) % 2], LIFT, slides=True, shape=_lids) for k in (41, 42)),
+    *(BumpMotion(k, LIFT_BORDERS, _EYES[(k + 1) % 2], LIFT, slides=True, carries=True, shape=_lids) for k in (41, 42)),
 )
 
 CONSTRUCTIONS: Mapping[int, Construction] = {m.fap_id: m.construction for m in _MOTIONS}

@@ -1,4 +1,4 @@
-"""Places along the lips and the rims of the lids, between the feature points, where a bump takes its outline.
+"""Places along the lips, the brows and the rims of the lids, between the feature points, where a bump takes its outline.
 
 A bump that is told nothing between two feature points ends in a peak at one and waves at the other.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -22,7 +23,8 @@ LIPS = (
     ("8.4", "8.6", "8.1", "8.5", "8.3"),
     ("8.4", "8.8", "8.2", "8.7", "8.3"),
 )
-"""Feature points along the contours of the lips, from the subject's right to the left."""
+BROWS = (("4.6", "4.4", "4.2"), ("4.1", "4.3", "4.5"))
+"""Feature points along the contours of the lips and along the brows, from the subject's right to the left."""
 
 PARTS = (0.25, 0.5, 0.75)
 """Where places lie between two feature points."""
@@ -35,9 +37,18 @@ OFF = 0.08
 
 
 def lip_places(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
-    """Places along all contours of the lips that the feature points' weights (0 if absent) are blended at."""
+    """Places along all contours of the lips, where the feature points' weights (0 if absent) are blended."""
+    return _blended(face, LIPS, values)
+
+
+def brow_places(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
+    """Places along the brows, where the feature points' weights (0 if absent) are blended."""
+    return _blended(face, BROWS, values)
+
+
+def _blended(face: PreparedFace, curves: Sequence[Sequence[str]], values: Mapping[str, float]) -> list[Place]:
     found = []
-    for keys in LIPS:
+    for keys in curves:
         known = [k for k in keys if k in face.skin.points]
         if len(known) > 2:
             found += _along(face, known, [values.get(k, 0.0) for k in known])
@@ -46,6 +57,15 @@ def lip_places(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
 
 def rim_places(face: PreparedFace) -> list[Place]:
     """Places along the rims of all lids, with weight 0."""
+    if face not in _RIMS:
+        _RIMS[face] = _rim_places(face)
+    return _RIMS[face]
+
+
+_RIMS: WeakKeyDictionary[PreparedFace, list[Place]] = WeakKeyDictionary()
+
+
+def _rim_places(face: PreparedFace) -> list[Place]:
     found = []
     for eye in eyes(face):
         if eye is None:

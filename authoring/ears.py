@@ -15,8 +15,9 @@ from cloning.prepare import PreparedFace
 from fba.arrays import Floats
 from fba.faps import fap
 
-REACH = 0.55
-"""How far the moving skin reaches from the rim, as a share of the ear's height: just over its attachment."""
+REACH = 0.85
+"""How far the moving skin reaches from the rim, as a share of the ear's height: well over its attachment,
+so that the skin around gives way smoothly."""
 
 WIDEST = 0.9
 """Largest turn of an ear about its attachment, in radians; the rest of a pull stretches it."""
@@ -42,7 +43,8 @@ class Ear:
             at = face.skin.positions
             rim = tuple(k for k in (self.top, self.back, self.bottom) if k in face.skin.points)
             free = maker.within(rim, REACH * float(np.linalg.norm(at[self.top] - at[self.lower])))
-            made[self] = maker.weight(maker.goals(dict.fromkeys(rim, 1.0)), free)
+            goals = maker.goals(dict.fromkeys(rim, 1.0))
+            made[self] = maker.patch(free).weight(goals, face.skin.vertices)
         return made[self]
 
     def raised(self, face: PreparedFace, length: float) -> Floats:

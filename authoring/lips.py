@@ -17,13 +17,13 @@ HEIGHTS = (-600, -300, 300, 600)
 DEPTHS = (-1080, -540, 540, 1080)
 """The whole range of the standard, but for the lower lip's heights: 600 MNS/1024 is twice the height of a lip."""
 
-INNER, OUTER = 0.4, 0.45
+INNER, OUTER = 0.6, 0.55
 """Reach of a lip, in mouth widths: from the contact line to the nose, and some lining behind it."""
 
 PUSH = 0.6
 """A lip is pushed as a whole; its corners hardly go along."""
 
-STRETCH, RAISE = 1.5, 0.9
+STRETCH, RAISE = 1.9, 0.9
 """A stretched corner pushes the whole cheek before it; a raised one only the skin between nose and jaw."""
 
 _CORNERS = {6: "8.3", 7: "8.4", 53: "2.4", 54: "2.5", 12: "8.3", 13: "8.4", 59: "2.4", 60: "2.5"}
@@ -32,7 +32,7 @@ _MOTIONS = (
     *(BumpMotion(k, HEIGHTS, MOUTH, INNER, shape=lip_places) for k in (4, 5, 8, 9, 10, 11)),
     *(BumpMotion(k, HEIGHTS, MOUTH, OUTER, shape=lip_places) for k in (51, 52, 55, 56, 57, 58)),
     *(BumpMotion(k, DEPTHS, MOUTH, PUSH) for k in (16, 17)),
-    *(BumpMotion(k, HEIGHTS, MOUTH, STRETCH, (_CORNERS[k],), slides=True) for k in (6, 7, 53, 54)),
+    *(BumpMotion(k, HEIGHTS, MOUTH, STRETCH, (_CORNERS[k],), slides=True, carries=True) for k in (6, 7, 53, 54)),
     *(BumpMotion(k, HEIGHTS, MOUTH, RAISE, (_CORNERS[k],), slides=True, shape=lip_places) for k in (12, 13, 59, 60)),
 )
 

@@ -13,7 +13,7 @@ BEND_BORDERS = (-900, -450, 450, 900)
 """The whole ranges of the standard."""
 
 NOSE = ("9.1", "9.2")
-WING, TIP = 0.8, 1.3
+WING, TIP = 1.1, 1.6
 """Reach in widths of the nose: a wing with the skin beside it; the tip with the bridge up to the eyes."""
 
 _MOTIONS = (
