@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fat.face import AnimatableFace
+from fat.open_jaw import closed_mouth, open_jaw_mode
 from fat.tables import FaceDefTables
 from fat.validate import validate
 from fba.faps import LOW_LEVEL_FAPS, fap
@@ -19,6 +20,7 @@ from fba.neutral import check_neutral
 from fba.scene import FaceScene, Shape
 from fba.stream import FapStream
 from formats.gltf import GltfDocument
+from studio.jaw_mode import note_findings
 
 
 def describe_mesh(mesh: PolyMesh) -> dict[str, object]:
@@ -123,8 +125,16 @@ def describe_fapu(fapu: Fapu) -> dict[str, float]:
 def describe_face(face: AnimatableFace) -> tuple[dict[str, object], list[Finding]]:
     """Everything about an animatable face."""
     about, findings = describe_points(face.scene, face.feature_points)
-    about = {**describe_scene(face.scene), **about, "tables": describe_tables(face.tables), "notes": dict(face.notes)}
-    return about, [*validate(face), *findings]
+    findings = [*validate(face), *findings]
+    plays = all(f.severity != "error" for f in findings)
+    about = {
+        **describe_scene(face.scene),
+        **about,
+        "tables": describe_tables(face.tables),
+        "open_jaw": open_jaw_mode(face) if plays else None,
+        "notes": dict(face.notes),
+    }
+    return about, [*findings, *note_findings(face), *closed_mouth(face)] if plays else findings
 
 
 def mesh_findings(scene: FaceScene) -> list[Finding]:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 FacePath = Annotated[Path, typer.Argument(help="A face file; the word 'default' names the shipped source face.")]
 OutPath = Annotated[Path, typer.Option("--output", "-o", help="Where to write; the extension chooses the format.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
+
+OpenJaw = Annotated[
+    Literal["strict", "practical"] | None,
+    typer.Option(help="FAP 3 leaves the lips as the standard has it (strict), or opens the mouth (practical)."),
+]
 
 
 def parse_faps(text: str) -> tuple[int, ...]:

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from studio.cli.arguments import OpenJaw
 from studio.cli.outcome import usage
 from studio.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
     from cloning import CloneReport
+    from fat.open_jaw import Mode
 
 TargetPath = Annotated[Path, typer.Argument(help="The plain face mesh that shall become animatable.")]
 Out = Annotated[Path, typer.Option("--output", "-o", help="Where to write; the extension chooses the format.")]
@@ -35,6 +37,7 @@ def clone(
         bool, typer.Option("--as-published", help="Do literally what the paper says, for comparison.")
     ] = False,
     faps: Annotated[str | None, typer.Option(help="Only these FAPs, e.g. 3,5,12-14 or open_jaw.")] = None,
+    open_jaw: OpenJaw = None,
     shapes: Shapes = None,
     report: Annotated[Path | None, typer.Option(help="Write measures, warnings and timings as JSON.")] = None,
     sheet: Annotated[Path | None, typer.Option(help="Write a contact sheet (PNG): source above target.")] = None,
@@ -48,11 +51,23 @@ def clone(
         usage(f"--faps: {error}")
     check_outputs(output, report, sheet, inputs=(target, landmarks, source_landmarks, shapes))
     if shapes is not None:
-        if wanted is not None or sheet is not None:
-            usage("--shapes clones every shape as it is; it does not go with --faps or --sheet")
+        if wanted is not None or sheet is not None or open_jaw is not None:
+            usage("--shapes clones every shape as it is; it does not go with --faps, --open-jaw or --sheet")
         _clone_shapes(target, output, source, landmarks, source_landmarks, shapes, backend, as_published, report)
     else:
-        _clone_face(target, output, source, landmarks, source_landmarks, wanted, backend, as_published, report, sheet)
+        _clone_face(
+            target,
+            output,
+            source,
+            landmarks,
+            source_landmarks,
+            wanted,
+            backend,
+            as_published,
+            open_jaw,
+            report,
+            sheet,
+        )
 
 
 def _clone_face(
@@ -64,6 +79,7 @@ def _clone_face(
     faps: tuple[int, ...] | None,
     backend: str,
     as_published: bool,
+    open_jaw: Mode | None,
     report: Path | None,
     sheet: Path | None,
 ) -> None:
@@ -74,6 +90,7 @@ def _clone_face(
     from formats.landmarks import read_landmarks
     from studio.cli.console import console, print_findings, progress
     from studio.inputs import left_behind, points_of, scene_of
+    from studio.jaw_mode import with_open_jaw
     from studio.sheet import contact_sheet, save_png
 
     entry = format_of(output, writing=True)
@@ -90,6 +107,7 @@ def _clone_face(
         face, made = clone_with_report(
             animatable, found, points_given, backend=backend, as_published=as_published, faps=faps, progress=tell
         )
+        face, said = with_open_jaw(face, open_jaw)
         tell("writing", 0.95)
         write(face, output)
         if sheet is not None:
@@ -98,7 +116,7 @@ def _clone_face(
         if report is not None:
             _write_report(made, report)
     out = console()
-    print_findings((*made.findings, *left_behind(scene_of(found), target, output)), out)
+    print_findings((*made.findings, *said, *left_behind(scene_of(found), target, output)), out)
     out.print(f"{output}: {len(face.tables)} tables for {face.scene.vertex_count} vertices")
 
 

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from studio.cli.arguments import FacePath, OutPath
+from studio.cli.arguments import FacePath, OpenJaw, OutPath
 from studio.cli.outcome import usage
 
 if TYPE_CHECKING:
     from fat.face import AnimatableFace
+    from fat.open_jaw import Mode
     from fat.profiles import Profile
+    from fba.findings import Finding
 
 
 def export(
@@ -25,13 +27,16 @@ def export(
             "that name, to .npz, .usda, .usdc or a folder of OBJ."
         ),
     ] = "native",
+    open_jaw: OpenJaw = None,
 ) -> None:
     """Write a face in another format; its tables go along where the format can carry them."""
     from fat.profiles import PROFILES
 
     if profile == "native":
-        _export_face(face, output)
+        _export_face(face, output, open_jaw)
         return
+    if open_jaw is not None:
+        usage(f"--open-jaw goes with the native profile; the shapes of '{profile}' open the mouth in their own way")
     chosen = next((p for p in PROFILES if p == profile), None)
     if chosen is None:
         usage(f"--profile: there is no profile '{profile}'; known: native, {', '.join(PROFILES)}")
@@ -39,19 +44,24 @@ def export(
         _export_profile(face, output, chosen)
 
 
-def _export_face(face: Path, output: Path) -> None:
+def _export_face(face: Path, output: Path, open_jaw: Mode | None) -> None:
     from fat.face import AnimatableFace
     from formats import format_of, read, write
     from studio.cli.console import console, print_findings
     from studio.inputs import left_behind, scene_of
+    from studio.jaw_mode import with_open_jaw
 
     entry = format_of(output, writing=True)
     found = read(str(face))
+    said: list[Finding] = []
     if isinstance(found, AnimatableFace):
         _refuse_broken(found, face)
+        found, said = with_open_jaw(found, open_jaw)
+    elif open_jaw is not None:
+        usage(f"--open-jaw: {face} is a plain mesh without open_jaw")
     write(found, output)
     out = console()
-    print_findings(left_behind(scene_of(found), face, output), out)
+    print_findings([*said, *left_behind(scene_of(found), face, output)], out)
     if isinstance(found, AnimatableFace) and not entry.carries_tables:
         out.print(f"{output}: neutral mesh only, since {entry.name} cannot carry Facial Animation Tables")
     elif isinstance(found, AnimatableFace):

@@ -69,6 +69,7 @@ def _face(file: Path, landmarks: Path | None) -> tuple[dict[str, Any], list[Any]
 
 
 def _print(about: dict[str, Any], out: Any) -> None:
+    from fat.open_jaw import MEANINGS, NOTE
     from studio.cli.console import table
     from studio.describe import number_ranges
 
@@ -105,5 +106,9 @@ def _print(about: dict[str, Any], out: Any) -> None:
         )
         if tables["missing_faps"]:
             out.print(f"cannot play: FAPs {number_ranges(tables['missing_faps'])}")
+        mode = about["open_jaw"]
+        if mode is not None:
+            out.print(f"{NOTE}: {mode}: {MEANINGS[mode]}")
         for key, value in about["notes"].items():
-            out.print(f"{key}: {value}")
+            if key != NOTE or mode is None:
+                out.print(f"{key}: {value}")

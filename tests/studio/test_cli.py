@@ -18,8 +18,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from fat import AnimatableFace
+from fat.open_jaw import open_jaw_mode
 from fba import FapStream
-from formats import read, read_face, read_scene
+from formats import read, read_face, read_scene, write
 from formats.fap import write_fap
 from formats.shapes import read_shapes
 from formats.usd import read_shape_set
@@ -186,6 +187,42 @@ def test_play_draws(cloned: Path, tmp_path: Path) -> None:
     folder = tmp_path / "frames"
     assert fba("play", cloned, short, "-o", folder, "--size", "64").exit_code == 0
     assert len(list(folder.glob("*.png"))) == 3
+
+
+def test_open_jaw_strict_on_request(cloned: Path, tmp_path: Path) -> None:
+    out = tmp_path / "strict.usda"
+    assert fba("export", cloned, "-o", out, "--open-jaw", "strict").exit_code == 0
+    about = json.loads(fba("inspect", out, "--json").stdout)
+    assert (about["open_jaw"], about["notes"]["open_jaw"]) == ("strict", "strict")
+    assert json.loads(fba("inspect", cloned, "--json").stdout)["open_jaw"] == "practical"
+    assert "open_jaw: strict: the lips stay" in fba("inspect", out).stdout
+    back = fba("export", out, "-o", tmp_path / "back.wrl", "--open-jaw", "practical")
+    assert back.exit_code == Outcome.BAD_INPUT
+    assert "start from a practical source" in back.stderr
+    plain = fba("export", sample("faces/tri_head.obj"), "-o", tmp_path / "plain.wrl", "--open-jaw", "strict")
+    assert plain.exit_code == Outcome.USAGE
+    shapes = fba("export", cloned, "-o", tmp_path / "s.npz", "--profile", "arkit", "--open-jaw", "strict")
+    assert shapes.exit_code == Outcome.USAGE
+
+
+def test_clone_with_a_strict_jaw(tmp_path: Path) -> None:
+    out = tmp_path / "strict.wrl"
+    words = ("clone", sample("faces/tri_head.obj"), "-o", out, "--faps", "3", "--open-jaw", "strict")
+    result = fba(*words)
+    assert result.exit_code == 0
+    assert "the FAPs that open them are missing: 5 raise_b_midlip" in result.stdout
+    assert open_jaw_mode(read_face(out)) == "strict"
+    no_jaw = fba("clone", sample("faces/tri_head.obj"), "-o", out, "--faps", "5", "--open-jaw", "strict")
+    assert no_jaw.exit_code == Outcome.BAD_INPUT
+    assert "no table for FAP 3" in no_jaw.stderr
+
+
+def test_inspect_says_when_a_file_is_wrong_about_its_jaw(cloned: Path, tmp_path: Path) -> None:
+    face = read_face(cloned)
+    write(replace(face, notes={**face.notes, "open_jaw": "strict"}), tmp_path / "wrong.wrl")
+    found = json.loads(fba("inspect", tmp_path / "wrong.wrl", "--json").stdout)["findings"]
+    (finding,) = [f for f in found if f["code"] == "open-jaw"]
+    assert "by its tables it is practical" in finding["message"]
 
 
 def test_export_to_every_format_and_back(cloned: Path, tmp_path: Path) -> None:
