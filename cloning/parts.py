@@ -104,16 +104,20 @@ def missing_parts(scene: FaceScene) -> list[Finding]:
 def eye_center(vertices: Floats, pupil: Floats | None) -> Floats:
     """Centre of rotation of an eyeball: of the sphere that fits its vertices, (3,).
 
-    An eye made of several layers or with an open back still fits; where the sphere is off (a flat disc), the
-    centre of its bounding box is taken.
+    An eye made of several layers or with an open back still fits. Where the sphere is off, that of the front alone is
+    taken (a half ball with a flat back), and where that is off too (a flat disc), the centre of the bounding box.
     """
-    center, radius, error = fit_sphere(vertices)
+    middle: Floats = 0.5 * (vertices.max(axis=0) + vertices.min(axis=0))
     half = 0.5 * float(np.max(vertices.max(axis=0) - vertices.min(axis=0)))
-    far = pupil is not None and float(np.linalg.norm(pupil - center)) > 2.5 * radius
-    if far or error > 0.15 * radius or radius > 2.0 * half or radius < 0.5 * half:
-        middle: Floats = 0.5 * (vertices.max(axis=0) + vertices.min(axis=0))
-        return middle
-    return center
+    front = vertices[vertices[:, 2] > middle[2]]
+    for some, most in ((vertices, 0.15), (front, 0.05)):
+        if len(some) < 4:
+            continue
+        center, radius, error = fit_sphere(some)
+        far = pupil is not None and float(np.linalg.norm(pupil - center)) > 2.5 * radius
+        if not far and error <= most * radius and 0.5 * half <= radius <= 2.0 * half:
+            return center
+    return middle
 
 
 def _pieces(scene: FaceScene) -> _Pieces:
