@@ -35,14 +35,14 @@ UPPER_BORDERS = (-1080, -768, -512, -256, 256, 512, 768, 1024, 1080)
 LOWER_BORDERS = (-600, -256, 256, 512, 600)
 """A chord of 256 units stays within .4 % of the eyeball's radius of its arc."""
 
-OVERLAP = 0.05
+OVERLAP = 0.06
 """A rim goes this share of the eye's opening beyond the other one, but for its feature point, which goes exactly its
 way; so no light falls through where rims with different vertices meet."""
 
 ANY = 1.0
 """Rims that have gone farther than asked are left so."""
 
-BESIDE = 0.2
+BESIDE = 0.1
 """Share of the way from the feature point to each corner over which the overlap grows."""
 
 RIM = 0.02
@@ -70,8 +70,13 @@ STILL_POINTS = (
 LAYER = 0.02
 """A lid clears the ball by no more than this, in radii; by less where it is nearer at rest."""
 
-INSIDE = -0.02
-"""What lies deeper in the ball at rest, in radii, is the back of the socket and not watched."""
+TAPER, WIDE = 0.06, 0.4
+"""Share of the eye's width over which the turn grows from the corner on, where both lids are one skin: of a rim, and
+of skin that hardly follows it."""
+
+SINKS = 0.6
+"""A closed lid gives up this share of the distance by which its rim stands farther out than the other one, so that
+no slit opens between them from below."""
 
 FARTHEST = np.radians(70.0)
 """A lid turns by less than this."""
@@ -90,7 +95,7 @@ class Lid:
     ball : the eyeball.
     slices : (s,) x of the rim, from corner to corner.
     rims : (2, s) heights of the own and of the other rim over the middle of the ball.
-    reach : (s,) distance of the own rim from the axis through the middle of the ball.
+    reach : (2, s) distance of these rims from the axis through the middle of the ball.
     closing, opening : (n,) share of the rim's turn that each vertex of the skin follows.
     """
 
@@ -126,19 +131,34 @@ class Lid:
         """(s,) angle about +x that takes the rim its share of the way to the other rim."""
         own, other = self.rims
         goal = own + value / FAPU_DIVISOR * (other - own)
-        sines = [np.arcsin(np.clip(y / self.reach, -STEEPEST, STEEPEST)) for y in (own, goal)]
+        sines = [np.arcsin(np.clip(y / self.reach[0], -STEEPEST, STEEPEST)) for y in (own, goal)]
         angles: Floats = sines[0] - sines[1]
         return angles
 
-    def _turned(self, places: Floats, share: Floats, value: float, scale: float) -> Floats:
-        """Offsets (n, 3) of places that follow a share of the turn of the rim at their x."""
-        turn = scale * share * np.interp(places[:, 0], self.slices, self.angles(value), left=0.0, right=0.0)
-        _, y, z = (places - self.middle).T
-        cosine, sine = np.cos(turn) - 1.0, np.sin(turn)
-        return np.column_stack([np.zeros(len(places)), cosine * y - sine * z, sine * y + cosine * z])
+    def _width(self, x: Floats, share: Floats) -> Floats:
+        """1 along the lid, falling to 0 at the corners of the eye, for vertices (n,) at x."""
+        first, last = self.slices[0], self.slices[-1]
+        taper = TAPER + (WIDE - TAPER) * (1.0 - share)
+        return _smoothstep(np.minimum(x - first, last - x) / (taper * (last - first)))
 
-    def _exact(self, share: Floats, value: float) -> float:
-        """The scale of the turn with which the feature point moves exactly by the value."""
+    def _turned(self, places: Floats, share: Floats, value: float, scale: tuple[float, float]) -> Floats:
+        """Offsets (n, 3) of places that follow a share of the turn of the rim at their x."""
+        follows = share * self._width(places[:, 0], share)
+        turn = scale[0] * follows * np.interp(places[:, 0], self.slices, self.angles(value))
+        _, y, z = (places - self.middle).T
+        nearer = 1.0 - follows * np.interp(places[:, 0], self.slices, self._sink(value)) / np.hypot(y, z)
+        cosine, sine = nearer * np.cos(turn) - 1.0, nearer * np.sin(turn)
+        return np.column_stack(
+            [np.zeros(len(places)), cosine * y - sine * z + scale[1] * follows, sine * y + cosine * z]
+        )
+
+    def _sink(self, value: float) -> Floats:
+        """(s,) by how much the rim comes nearer to the axis."""
+        farther: Floats = np.maximum(self.reach[0] - self.reach[1], 0.0)
+        return SINKS * max(value, 0.0) / FAPU_DIVISOR * farther
+
+    def _exact(self, share: Floats, value: float) -> tuple[float, float]:
+        """The scale of the turn, and the lift besides, with which the feature point moves exactly by the value."""
         from scipy.optimize import brentq
 
         entry, skin = fap(self.fap_id), self.face.skin
@@ -147,10 +167,14 @@ class Lid:
         wanted = value * self.face.fapu.unit(entry.unit) / self.face.fapu.es0 * entry.direction[1]
 
         def missing(scale: float) -> float:
-            return float(weights @ self._turned(skin.vertices[vertices], share[vertices], value, scale)[:, 1]) - wanted
+            turned = self._turned(skin.vertices[vertices], share[vertices], value, (scale, 0.0))
+            return float(weights @ turned[:, 1]) - wanted
 
         turn = float(np.abs(np.interp(skin.vertices[vertices, 0], self.slices, self.angles(value))).max())
-        return float(brentq(missing, 0.0, FARTHEST / turn, xtol=1e-13))
+        most = FARTHEST / turn
+        if missing(0.0) * missing(most) < 0.0:
+            return float(brentq(missing, 0.0, most, xtol=1e-13)), 0.0
+        return most, -missing(most) / float(weights @ share[vertices])
 
     def _travel(self, value: float) -> Floats:
         """Share of the opening for each of the eye's slices."""
@@ -166,13 +190,12 @@ class Lid:
         ball, es0 = self.ball, self.face.fapu.es0
         moved = np.any(skin[ball.vertices] != 0.0, axis=1)
         vertices = ball.vertices[moved]
-        local = (ball.rest[moved] - ball.center) / es0
-        rest = ball.clearance(local)
-        place = local + skin[vertices]
-        needed = ball.radius(place) / es0 * (1.0 + np.minimum(rest, LAYER))
+        local = ball.rest[moved] - ball.center
+        place = local + es0 * skin[vertices]
+        needed = ball.radius(place) * (1.0 + np.minimum(ball.clearance(local), LAYER))
         front = np.sqrt(np.maximum(needed**2 - place[:, 0] ** 2 - place[:, 1] ** 2, 0.0))
-        watched = (rest > INSIDE) & (local[:, 2] > 0.0) & (place[:, 2] > 0.0)
-        skin[vertices, 2] += np.where(watched, np.maximum(front - place[:, 2], 0.0), 0.0)
+        before = (local[:, 2] > 0.0) & (place[:, 2] > 0.0)
+        skin[vertices, 2] += np.where(before, np.maximum(front - place[:, 2], 0.0), 0.0) / es0
 
     @property
     def middle(self) -> Floats:
@@ -231,7 +254,7 @@ def lid(face: PreparedFace, fap_id: int, unit: Offsets | None = None) -> Lid | N
 
 def _lid(face: PreparedFace, fap_id: int) -> Lid | None:
     side, part = LIDS[fap_id]
-    eye, pupil = eyes(face)[side], face.place(("3.5", "3.6")[side])
+    eye, pupil = _to_the_corners(eyes(face)[side]), face.place(("3.5", "3.6")[side])
     near = [b for b in balls(face) if np.linalg.norm(b.center - pupil) < 2.0 * float(np.median(b.radii))]
     if eye is None or not near:
         return None
@@ -239,11 +262,27 @@ def _lid(face: PreparedFace, fap_id: int) -> Lid | None:
     corners = np.array([face.skin.positions[k] for k in EYES[side][0]])
     own, other = (_rim_line(eye, k, corners) - center for k in (part, 1 - part))
     heights = np.stack([own[:, 1], np.interp(own[:, 0], other[:, 0], other[:, 1])])
-    reach = np.hypot(own[:, 1], own[:, 2])
+    reach = np.stack([np.hypot(*own[:, 1:].T), np.interp(own[:, 0], other[:, 0], np.hypot(*other[:, 1:].T))])
     nothing = np.zeros(face.skin.vertex_count)
     found = Lid(face, fap_id, eye, part, near[0], own[:, 0] + center[0], heights, reach, nothing, nothing)
     closing, opening = (_shares(found, above) for above in (CLOSING, OPENING))
     return replace(found, closing=closing, opening=opening)
+
+
+def _to_the_corners(eye: Eye | None) -> Eye | None:
+    """The eye with slices added towards its corners, as long as it is less and less open there."""
+    if eye is None:
+        return None
+    opening = eye.heights[0] - eye.heights[1]
+    added = eye.open.copy()
+    used = np.flatnonzero(added)
+    for slices in (range(used[0] - 1, -1, -1), range(used[-1] + 1, len(opening))):
+        for k in slices:
+            inner = opening[k + 1 if k < used[0] else k - 1]
+            if not 0.0 < opening[k] <= inner:
+                break
+            added[k] = True
+    return replace(eye, open=added)
 
 
 def _rim_line(eye: Eye, part: int, corners: Floats) -> Floats:
