@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fat.build import build_tables
+from fat.compact import compact
 from fat.face import AnimatableFace
 from fat.motion import FaceMotion
 from fat.rig import RigTables, rig_eye, rig_head
@@ -21,7 +22,6 @@ from samples.build.low_level import RECIPES
 from samples.build.makehuman import MakeHuman
 from samples.build.motions import MotionBuilder
 from samples.build.neutral import neutral
-from samples.build.rounding import rounded
 from samples.build.symmetry import SymmetricMakeHuman
 
 RACES = {"caucasian": 0.35, "asian": 0.35, "african": 0.3}
@@ -51,7 +51,7 @@ def build_source(makehuman: MakeHuman) -> AnimatableFace:
     motions += eye_thrusts(head)
     motions += high_level_motions(builder)
     scene, transforms = _rig(head, colored(head))
-    tables = rounded(build_tables(scene, head.fapu, motions, transforms), head.fapu)
+    tables = compact(build_tables(scene, head.fapu, motions, transforms), head.fapu)
     notes = {table_name(r.fap): r.note for r in RECIPES if r.note}
     return AnimatableFace(scene, head.points, tables, head.fapu, notes)
 
