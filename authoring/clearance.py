@@ -11,7 +11,13 @@ from cloning.prepare import PreparedFace
 from fba.arrays import Floats
 
 LAYER = 0.08
-"""No more than this clearance is kept, in radii of the eyeball: about the thickness of a lid."""
+"""Clearance up to this, in radii of the eyeball, is kept wholly: about the thickness of a lid."""
+
+GIVES = 0.15
+"""Thicker skin, of brows and cheeks, gives way to this share of what it has above the layer."""
+
+FAR = 3.0
+"""Skin that comes no nearer to the eyeball's middle than this, in radii, is not looked at."""
 
 BEHIND = -0.1
 """Skin farther behind the middle of the eyeball than this, in radii, is beside it and cannot come in front."""
@@ -20,25 +26,27 @@ BEHIND = -0.1
 def before_eyeballs(face: PreparedFace, field: Floats) -> Floats:
     """A field (n, 3) in eye separations, pushed forward where skin would sink into an eyeball.
 
-    Height and width, which feature points around the eyes are measured in, stay as they are. Skin keeps the clearance
-    that it has at rest, up to a thin layer; what lies inside the eyeball at rest may stay there.
+    Height and width, which feature points around the eyes are measured in, stay as they are. Skin keeps most of the
+    clearance that it has at rest; what lies inside the eyeball at rest may stay there.
     """
     if face not in _BALLS:
         _BALLS[face] = balls(face)
     es0 = face.fapu.es0
     out = field.copy()
+    moving = np.flatnonzero(np.any(field != 0.0, axis=1))
+    rest, moved = es0 * face.skin.vertices[moving], es0 * (face.skin.vertices + field)[moving]
     for ball in _BALLS[face]:
-        moves = np.any(field[ball.vertices] != 0.0, axis=1)
-        if not moves.any():
-            continue
-        vertices, local = ball.vertices[moves], ball.rest[moves] - ball.center
-        place = local + es0 * field[vertices]
-        keep = np.minimum(ball.clearance(local), LAYER)
+        local, place = rest - ball.center, moved - ball.center
+        size = float(np.median(ball.radii))
+        near = (np.linalg.norm(place, axis=1) < FAR * size) & (local[:, 2] > 0.0) & (place[:, 2] > BEHIND * size)
+        local, place = local[near], place[near]
+        clear = ball.clearance(local)
+        keep = np.minimum(clear, LAYER) + GIVES * np.clip(clear - LAYER, 0.0, 1.0)
         needed = ball.radius(place) * (1.0 + keep)
         flat = place[:, 0] ** 2 + place[:, 1] ** 2
         front = np.sqrt(np.maximum(needed**2 - flat, 0.0))
-        near = (keep > 0.0) & (flat < needed**2) & (local[:, 2] > 0.0) & (place[:, 2] > BEHIND * needed)
-        out[vertices, 2] += np.where(near, np.maximum(front - place[:, 2], 0.0), 0.0) / es0
+        lifted = np.where((clear > 0.0) & (flat < needed**2), np.maximum(front - place[:, 2], 0.0), 0.0)
+        out[moving[near], 2] += lifted / es0
     return out
 
 

@@ -1,4 +1,4 @@
-"""Places along the lips, the brows and the rims of the lids, between the feature points, where a bump takes its outline.
+"""Places along lips, brows and rims of lids, between the feature points, where a bump takes its outline.
 
 A bump that is told nothing between two feature points ends in a peak at one and waves at the other.
 """
