@@ -45,7 +45,7 @@ class HighLevel:
             return None, None, why
         face = self.fitting.face
         skin = Lips(face).in_contact(face.skin.join(offsets), gaps=entry in CLOSED)
-        done = self.fitting.finished(offsets, skin)
+        done = self.shapes.without_resting(self.fitting.finished(offsets, skin))
         step = Step(BLEND_MAX, "posed", parts)
         return FaceMotion(name, fap_id, select, BLEND_MAX, done), step, why
 

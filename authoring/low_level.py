@@ -63,7 +63,8 @@ class LowLevel:
             if not any(value * sign > 0 for value in found):
                 self._side(entry, sign, found, why)
         rows = sorted(found.items())
-        motions = tuple(FaceMotion(entry.name, fap_id, 1, value, offsets) for value, (offsets, _) in rows)
+        still = self.shapes.without_resting
+        motions = tuple(FaceMotion(entry.name, fap_id, 1, value, still(offsets)) for value, (offsets, _) in rows)
         return Made(motions, tuple(step for _, (_, step) in rows), tuple(dict.fromkeys(why)), tuple(findings))
 
     def _side(self, entry: Fap, sign: int, found: dict[int, tuple[Offsets, Step]], why: list[str]) -> None:

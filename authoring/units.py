@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from authoring.construction import Offsets
 from authoring.names import GAZES, SIDES, Meaning, meaning
+from authoring.riders import skin_offsets
 from cloning.prepare import PreparedFace
 from fba.arrays import Floats
 from fba.errors import MeshError
@@ -20,6 +21,9 @@ from fba.shapes import ShapeSet
 
 HALF_WIDTH = 0.12
 """Width of the blend between the halves of a shape that moves both sides, in eye separations."""
+
+MOVES = 0.02
+"""Skin that moves by more than this, in eye separations, takes along what lies on it, unless that is known to rest."""
 
 RESTING = (Role.EYE_LEFT, Role.EYE_RIGHT, Role.UPPER_TEETH)
 """Parts that units leave where they are: eyeballs turn by FAPs 23 to 26, the upper teeth belong to the skull."""
@@ -89,13 +93,19 @@ class FaceShapes:
     Attributes
     ----------
     given : (fap_id, select) -> shapes that are this FAP, viseme or expression.
+    resting : parts that lie on moving skin and yet never move in any shape: spectacles, hair, clothes.
     """
 
     units: Units
     given: Mapping[tuple[int, int], tuple[Given, ...]]
     unknown: tuple[str, ...]
     ignored: Mapping[str, str]
+    resting: frozenset[str]
     findings: tuple[Finding, ...]
+
+    def without_resting(self, offsets: Mapping[str, Floats]) -> Offsets:
+        """The offsets without those of parts that rest."""
+        return {name: part for name, part in offsets.items() if name not in self.resting}
 
 
 def sort_shapes(
@@ -155,8 +165,22 @@ def sort_shapes(
         {key: tuple(rows) for key, rows in given.items()},
         tuple(unknown),
         ignored,
+        _resting_parts(face, list(offsets.values())),
         tuple(findings),
     )
+
+
+def _resting_parts(face: PreparedFace, shapes: Sequence[Offsets]) -> frozenset[str]:
+    """Parts besides the skin that rest in every shape, though the skin below them moves in some."""
+    moving = {name for offsets in shapes for name in offsets}
+    others = {s.name for s in face.scene.with_role(Role.OTHER) if s.mesh.vertex_count} - moving
+    found: set[str] = set()
+    for offsets in shapes:
+        if others <= found:
+            break
+        riding = skin_offsets(face, face.skin.join(offsets) / face.fapu.es0)
+        found.update(n for n in others & riding.keys() if np.abs(riding[n]).max() > MOVES * face.fapu.es0)
+    return frozenset(found)
 
 
 def resting(face: PreparedFace, offsets: Mapping[str, Floats]) -> Offsets:

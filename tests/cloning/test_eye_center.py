@@ -25,7 +25,7 @@ def test_whole_balls_and_half_balls_turn_about_their_middle() -> None:
     assert np.allclose(eye_center(ball(-2.0), None), CENTER)
     half = ball(0.0)
     back = np.repeat(CENTER[None], 24, axis=0)
-    assert np.allclose(eye_center(np.concatenate([half, back]), CENTER + [0.0, 0.0, 2.0]), CENTER)
+    assert np.allclose(eye_center(np.concatenate([half, back]), CENTER + np.array([0.0, 0.0, 2.0])), CENTER)
 
 
 def test_a_flat_disc_turns_about_the_middle_of_its_box() -> None:
