@@ -25,8 +25,8 @@ FLIPS_MUST = 0.5
 """Percent of the moving triangles that may turn over where the table ends; none at the normal amplitude."""
 
 STRETCH_MUST = 5.0
-"""Largest stretch of an edge in skin that is hidden at rest. Measured on the shapes of ICT-FaceKit: 4.2 for a jaw opened
-as far as it goes, at most 2.1 for all others. An edge that gets longer still has one end left behind."""
+"""Largest stretch of an edge in skin that is hidden at rest. Measured on the shapes of ICT-FaceKit: 4.2 for a jaw
+opened as far as it goes, at most 2.1 for all others. An edge that gets longer still has one end left behind."""
 
 SLACK = 0.01
 """Eye separations (0.6 mm) added to both lengths of an edge, so that the tiny edges of a mesh do not count."""
@@ -39,6 +39,9 @@ DEPTH = 0.02
 
 PENETRATION_MUST = 0.2
 """Percent of the skin vertices on the front of an eyeball that may get into it."""
+
+MARGIN = 0.1
+"""Parts of a limit by which a clone's measure must exceed the source's to be told."""
 
 ASYMMETRY_MAY = 0.01
 """Relative L2 difference of the two sides from which it is worth telling; a modelled face may want it."""
@@ -102,14 +105,14 @@ class FapQuality:
 
         Parameters
         ----------
-        beside : the same row of the face that this one was cloned from: only what is worse than there is told.
+        beside : the same row of the face that this one was cloned from: only what is clearly worse than there is told.
         """
         theirs = {} if beside is None else {code: share for code, _, share in beside._shares()}
         severity: Severity = "error" if beside is None else "warning"
         return [
             Finding(severity, code, text, self.where)
             for code, text, share in self._shares()
-            if share > max(1.0, theirs.get(code, 0.0))
+            if share > max(1.0, theirs.get(code, 0.0) + MARGIN * (beside is not None))
         ]
 
     @property
@@ -122,7 +125,7 @@ class FapQuality:
         if self.high_level or self.asymmetry is None or self.asymmetry <= ASYMMETRY_MAY:
             return []
         text = f"differs from its mirror image by {100 * self.asymmetry:.1f} %"
-        return [Finding("warning", "asymmetry", text, self.where)]
+        return [Finding("warning", "fap-asymmetry", text, self.where)]
 
     def to_dict(self) -> dict[str, object]:
         """Everything as plain data."""
@@ -135,26 +138,26 @@ class FapQuality:
         if self.cross_talk is not None and self.cross_fap is not None:
             other = fap(self.cross_fap).name
             text = f"moves the feature point of {other} by {100 * self.cross_talk:.1f} % of its own, at most 5 %"
-            yield "cross-talk", text, self.cross_talk / CROSS_TALK_MUST
+            yield "fap-cross-talk", text, self.cross_talk / CROSS_TALK_MUST
         if self.flips is not None and not self.high_level:
             text = f"{self.flips:.2f} % of the moving triangles turn over at a normal amplitude, at most 0"
-            yield "flips", text, 1.0 + self.flips if self.flips > 0.0 else 0.0
+            yield "fap-flips", text, 1.0 + self.flips if self.flips > 0.0 else 0.0
         if self.flips_at_limit is not None:
             text = (
                 f"{self.flips_at_limit:.2f} % of the moving triangles turn over at {self.limit}, at most {FLIPS_MUST}"
             )
-            yield "flips-at-limit", text, self.flips_at_limit / FLIPS_MUST
+            yield "fap-flips-at-limit", text, self.flips_at_limit / FLIPS_MUST
         if self.stretch is not None:
             text = f"an edge of hidden skin gets {self.stretch:.1f} times as long, at most {STRETCH_MUST:g}"
-            yield "tear", text, self.stretch / STRETCH_MUST
+            yield "fap-tear", text, self.stretch / STRETCH_MUST
         if self.parted is not None:
             text = f"{self.parted} vertices come apart along a seam"
-            yield "seam", text, 1.0 + self.parted if self.parted else 0.0
+            yield "fap-seam", text, 1.0 + self.parted if self.parted else 0.0
         if self.penetration is not None:
             text = (
                 f"{self.penetration:.2f} % of the skin before the eyeballs gets into them, at most {PENETRATION_MUST}"
             )
-            yield "penetration", text, self.penetration / PENETRATION_MUST
+            yield "fap-penetration", text, self.penetration / PENETRATION_MUST
 
 
 def mirrored(fap_id: int, value: int) -> tuple[int, int]:

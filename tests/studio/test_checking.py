@@ -17,6 +17,11 @@ def source() -> AnimatableFace:
     return read_face("default")
 
 
+def only(face: AnimatableFace, *faps: int) -> AnimatableFace:
+    """The face with the tables of these FAPs alone."""
+    return replace(face, tables=FaceDefTables(tuple(t for t in face.tables if t.fap_id in faps)))
+
+
 def changed(face: AnimatableFace, fap_id: int, factor: float) -> AnimatableFace:
     """The face with the displacements of one FAP multiplied."""
     tables = []
@@ -36,10 +41,12 @@ def test_the_shipped_source_passes_beside_itself(source: AnimatableFace) -> None
     assert result.fidelity.fp_error_worst == 0.0
     assert result.fidelity.lip_gap == 0.0
     assert result.fidelity.lid_gap == 0.0
+    assert not [f for f in (*result.problems, *result.remarks) if f.code.startswith("fap-")]
+    assert all(theirs is not None and theirs.key == mine.key for mine, theirs in result.compared)
 
 
 def test_a_fap_that_moves_too_far_is_named(source: AnimatableFace) -> None:
-    result = check_face(changed(source, 3, 1.02))
+    result = check_face(changed(only(source, 3, 12), 3, 1.02))
     assert not result.passed
     own = [f for f in result.problems if f.code == "own-fp"]
     assert [f.where for f in own] == ["FAP 3"]
@@ -47,9 +54,10 @@ def test_a_fap_that_moves_too_far_is_named(source: AnimatableFace) -> None:
 
 
 def test_lids_that_stay_open_and_a_mouth_that_opens_less_are_found(source: AnimatableFace) -> None:
-    lids = check_face(changed(source, 19, 0.7), source)
+    few = only(source, 3, 19, 20)
+    lids = check_face(changed(few, 19, 0.7), few)
     assert {"lid-gap", "own-fp"} <= {f.code for f in lids.problems}
-    jaw = check_face(changed(source, 3, 0.5), source)
+    jaw = check_face(changed(few, 3, 0.5), few)
     assert {"lip-gap", "own-fp"} <= {f.code for f in jaw.problems}
 
 
@@ -63,3 +71,17 @@ def test_tables_that_cannot_be_played_are_reported_and_not_measured(source: Anim
     assert not result.passed
     assert result.faps == ()
     assert any("nowhere" in f.message for f in result.findings)
+
+
+def test_beside_its_source_a_face_is_told_only_what_is_worse(source: AnimatableFace) -> None:
+    # A lip raised three times as far folds; by itself that is an error, beside the source a warning.
+    few = only(source, 51, 57)
+    wild = changed(few, 51, 3.0)
+    alone, compared = check_face(wild), check_face(wild, few)
+    assert "fap-flips" in {f.code for f in alone.problems if "lower_t_midlip_o" in f.where}
+    assert {f.severity for f in compared.remarks if "lower_t_midlip_o" in f.where} == {"warning"}
+    assert not [f for f in compared.problems if f.code.startswith("fap-")]
+    data = alone.to_dict()
+    assert [row["name"] for row in data["quality"]] == [row.name for row in alone.quality]  # type: ignore[attr-defined]
+    assert data["source_quality"] is None
+    assert {"own_error", "cross_talk", "flips", "stretch", "penetration", "asymmetry"} <= set(data["quality"][0])  # type: ignore[index]

@@ -53,7 +53,7 @@ def test_a_vertex_pulled_over_its_neighbours_flips_two_of_six_triangles() -> Non
     assert far.flips == 0.0
     assert far.flips_at_limit == pytest.approx(100 * 2 / 6)
     assert (less.value, less.limit) == (-120, -120)
-    assert [f.code for f in far.failures()] == ["flips-at-limit"]
+    assert [f.code for f in far.failures()] == ["fap-flips-at-limit"]
 
 
 def test_own_motion_and_cross_talk_are_read_at_the_feature_points() -> None:
@@ -102,7 +102,7 @@ def test_only_hidden_skin_tears(around: bool, tears: bool) -> None:
     row = played(shapes, [(31, 200, {"inner": offsets})])[0]
     longest = (np.hypot(0.2, 1.2) + SLACK) / (0.2 + SLACK)
     assert row.stretch == pytest.approx(longest if tears else 1.0)
-    assert ("tear" in [f.code for f in row.failures()]) is tears
+    assert ("fap-tear" in [f.code for f in row.failures()]) is tears
 
 
 def test_a_seam_that_opens_is_counted() -> None:
