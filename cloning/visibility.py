@@ -43,18 +43,18 @@ def _front(flat: Floats, depth: Floats, triangles: Ints, cells: int) -> Floats:
     """Depth just behind the foremost surface at each vertex: a depth buffer of sample points of the triangles."""
     low = flat.min(axis=0)
     size = float((flat.max(axis=0) - low).max()) / cells
-    buffer = np.full((cells + 2, cells + 2), -np.inf)
-    corners = flat[triangles]
+    side = cells + 2
+    buffer = np.full(side * side, -np.inf)
+    placed = np.concatenate([(flat - low) / size, depth[:, None]], axis=1)
+    corners = placed[triangles, :2]
     spread = np.linalg.norm(corners.max(axis=1) - corners.min(axis=1), axis=1)
-    steps = np.clip(np.ceil(spread / size).astype(int), 1, 24)
+    steps = np.clip(np.ceil(spread).astype(int), 1, 24)
     for n in np.unique(steps):
-        some = triangles[steps == n]
-        grid = [(i / n, j / n, 1.0 - (i + j) / n) for i in range(n + 1) for j in range(n + 1 - i)]
-        weights = np.array(grid)
-        places = np.einsum("gk,tkc->tgc", weights, flat[some]).reshape(-1, 2)
-        heights = np.einsum("gk,tk->tg", weights, depth[some]).ravel()
-        cell = ((places - low) / size).astype(int)
-        np.maximum.at(buffer, (cell[:, 0], cell[:, 1]), heights)
-    cell = ((flat - low) / size).astype(int)
-    found: Floats = buffer[cell[:, 0], cell[:, 1]] - 3.0 * size
+        grid = np.array([(i / n, j / n, 1.0 - (i + j) / n) for i in range(n + 1) for j in range(n + 1 - i)])
+        some = placed[triangles[steps == n]].transpose(1, 0, 2).reshape(3, -1)
+        samples = (grid @ some).reshape(-1, 3)
+        cell = samples[:, :2].astype(int)
+        np.maximum.at(buffer, cell[:, 0] * side + cell[:, 1], samples[:, 2])
+    cell = placed[:, :2].astype(int)
+    found: Floats = buffer[cell[:, 0] * side + cell[:, 1]] - 3.0 * size
     return found
