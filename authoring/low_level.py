@@ -118,29 +118,29 @@ class LowLevel:
 
     def _from_units(self, entry: Fap, sign: int) -> dict[int, tuple[Offsets, Step]] | str:
         recipe = RECIPES.get(entry.id)
-        borders = [b for b in recipe.borders if b.value * sign > 0 or entry.id in ARCS] if recipe else []
-        if recipe is None or not borders:
-            return f"no unit shows {entry.name} {'below' if sign < 0 else 'above'} zero"
+        if recipe is None:
+            return "no unit shows it"
         out: dict[int, tuple[Offsets, Step]] = {}
-        for border in borders:
+        for border in recipe.borders:
+            bends = entry.id in ARCS and border.value > 0
+            if border.value * sign < 0 and not bends:
+                continue
             made = self.maker.border(recipe, border)
             if isinstance(made, str):
                 return made
-            out.update(self._steps(entry.id, sign, made))
-        return out or f"the unit of {entry.name} cannot be bent below zero"
+            out = (self._bent(entry.id, sign, made) if bends else {}) or out
+            if not out and border.value * sign > 0:
+                out = {made.value: (made.offsets, Step(made.value, "units", self._named(made.parts, 1.0)))}
+        return out or f"no unit shows it {'below' if sign < 0 else 'above'} zero"
 
-    def _steps(self, fap_id: int, sign: int, made: UnitMotion) -> dict[int, tuple[Offsets, Step]]:
-        """The borders of one unit's motion: jaws turn and lids slide, in steps; all else goes straight."""
-        rows: Mapping[int, Offsets] = {}
-        if fap_id in ARCS:
-            values = [b for b in ARCS[fap_id] if b * sign > 0]
-            rows = _bent(self.face, fap_id, values, self.maker.units.get(next(iter(made.parts))))
-        if not rows and made.value * sign > 0:
-            rows = {made.value: made.offsets}
-        return {
-            value: (offsets, Step(value, "units", self._named(made.parts, value / made.value)))
-            for value, offsets in rows.items()
-        }
+    def _bent(self, fap_id: int, sign: int, made: UnitMotion) -> dict[int, tuple[Offsets, Step]]:
+        """The borders of a unit's motion on its arc: jaws turn and lids slide; none where the face has no such arc."""
+        values = [b for b in ARCS[fap_id] if b * sign > 0]
+        unit = self.maker.units.get(next(iter(made.parts)))
+        rows = (
+            jaw.open_jaw(self.face, values, unit) if fap_id == JAW else lids.close_lid(self.face, fap_id, values, unit)
+        )
+        return {v: (o, Step(v, "units", self._named(made.parts, v / made.value))) for v, o in rows.items()}
 
     def _named(self, parts: Mapping[str, float], share: float) -> dict[str, float]:
         """Factors by the shapes' own names."""
@@ -155,10 +155,3 @@ class LowLevel:
         if rows:
             return rows
         return "; ".join(f.message for f in findings) or f"the construction of {entry.name} has no such side"
-
-
-def _bent(face: PreparedFace, fap_id: int, values: Sequence[int], unit: Offsets | None) -> Mapping[int, Offsets]:
-    """A motion on an arc at several values, after the unit that shows how the skin follows it."""
-    if fap_id == JAW:
-        return jaw.open_jaw(face, values, unit)
-    return lids.close_lid(face, fap_id, values, unit)
