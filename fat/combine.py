@@ -7,8 +7,9 @@ are evaluated. A low-level FAP that comes alone is never changed. docs/combining
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from fba.arrays import Floats, Ints
 from fba.errors import FapStreamError
 from fba.faps import fap
 
-RULES = ("corners", "contours", "lids", "lips")
+RULES = ("corners", "contours", "brows", "lids", "lips")
 """All rules, in the order in which they apply."""
 
 CORNER_PAIRS = ((6, 53), (7, 54), (12, 59), (13, 60))
@@ -27,11 +28,14 @@ CORNER_PAIRS = ((6, 53), (7, 54), (12, 59), (13, 60))
 CONTOUR_PAIRS = ((4, 51), (8, 55), (9, 56), (5, 52), (10, 57), (11, 58))
 """Inner and outer contour of the same stretch of lip."""
 
-LID_PAIRS = ((19, 21), (20, 22))
-"""Upper and lower lid of one eye."""
+MEETING_PAIRS: Mapping[str, tuple[tuple[int, int], ...]] = MappingProxyType(
+    {"brows": ((37, 38),), "lids": ((19, 21), (20, 22)), "lips": ((4, 5), (8, 10), (9, 11))}
+)
+"""Rule -> FAPs that move two points towards each other: the inner ends of the brows, the lids of an eye, the lips."""
 
-LIP_PAIRS = ((4, 5), (8, 10), (9, 11))
-"""Upper and lower inner lip, which meet."""
+KEPT = MappingProxyType({"brows": 0.5, "lids": 0.0, "lips": 0.0})
+"""Share of the neutral distance that stays between the two: rims meet; the skin between the brows can be squeezed to
+half its width before it folds (no triangle of the shipped source flips down to .52 of the distance, some do at .28)."""
 
 PROBE_VALUE = 100.0
 """FAP units at which the tie of a pair is measured: well inside the range of every FAP involved."""
@@ -60,7 +64,7 @@ class _Ties:
 
 @dataclass(frozen=True, slots=True)
 class _Rims:
-    """Columns of two FAPs that close a gap, its probe and neutral opening, and columns (inner, outer) of contours."""
+    """Columns of two FAPs that close a gap, its probe, how far it may close, and columns (inner, outer) of contours."""
 
     first: int
     second: int
@@ -97,16 +101,20 @@ class Combination:
             *(CONTOUR_PAIRS if "contours" in self.rules else ()),
         )
         self._ties = _measured_ties(face, columns, [p for p in tied if p[0] in columns and p[1] in columns])
-        meeting = (*(LID_PAIRS if "lids" in self.rules else ()), *(LIP_PAIRS if "lips" in self.rules else ()))
-        pairs = [p for p in meeting if p[0] in columns and p[1] in columns]
+        meeting = [
+            (rule, pair)
+            for rule, pairs in MEETING_PAIRS.items()
+            for pair in pairs
+            if rule in self.rules and pair[0] in columns and pair[1] in columns
+        ]
         self._rounding = ROUNDING * face.fapu.es0
-        self._response = Response(face, [_closing(p) for p in pairs])
+        self._response = Response(face, [_closing(pair) for _, pair in meeting])
         places = face.feature_points.positions(face.scene)
         self._rims = []
-        for number, pair in enumerate(pairs):
-            upper, lower = (places[fap(k).feature_points[0]] for k in pair)
+        for number, (rule, pair) in enumerate(meeting):
+            apart = -sum(float(places[key] @ direction) for key, direction in _closing(pair).items())
             outer = tuple((columns[a], columns[b]) for a, b in CONTOUR_PAIRS if a in pair and b in columns)
-            opening = max(float(upper[1] - lower[1]), 0.0)
+            opening = max(apart * (1.0 - KEPT[rule]), 0.0)
             self._rims.append(_Rims(columns[pair[0]], columns[pair[1]], number, opening, outer))
 
     def __call__(self, values: Floats) -> Floats:
@@ -195,7 +203,8 @@ def chosen_rules(names: Collection[str] | None) -> tuple[str, ...]:
 
 def _columns(face: AnimatableFace) -> dict[int, int]:
     """FAP -> its column, for FAPs in rules that move vertices and whose feature point is on a surface."""
-    members = {k for pair in (*CORNER_PAIRS, *CONTOUR_PAIRS, *LID_PAIRS, *LIP_PAIRS) for k in pair}
+    pairs = (*CORNER_PAIRS, *CONTOUR_PAIRS, *(pair for found in MEETING_PAIRS.values() for pair in found))
+    members = {number for pair in pairs for number in pair}
     shapes = {s.name for s in face.scene.shapes}
     found = {}
     for column, table in enumerate(face.tables):
@@ -206,20 +215,21 @@ def _columns(face: AnimatableFace) -> dict[int, int]:
     return found
 
 
+def _own(number: int) -> Probe:
+    """A FAP's own feature point along the FAP's direction."""
+    direction = fap(number).direction
+    assert direction is not None  # every FAP in a rule is a translation
+    return {fap(number).feature_points[0]: direction}
+
+
 def _closing(pair: tuple[int, int]) -> Probe:
-    """How far two rims come together: the upper point down, the lower one up."""
-    upper, lower = (fap(k).feature_points[0] for k in pair)
-    return {upper: (0.0, -1.0, 0.0), lower: (0.0, 1.0, 0.0)}
+    """How far two points come together, each along the direction of its FAP."""
+    return {**_own(pair[0]), **_own(pair[1])}
 
 
 def _measured_ties(face: AnimatableFace, columns: dict[int, int], pairs: list[tuple[int, int]]) -> _Ties:
     """The pairs of which each FAP also moves the other's feature point on this face."""
-    probes: list[Probe] = []
-    for number in (n for pair in pairs for n in pair):
-        direction = fap(number).direction
-        assert direction is not None  # all FAPs of lips are translations
-        probes.append({fap(number).feature_points[0]: direction})
-    response = Response(face, probes)
+    response = Response(face, [_own(number) for pair in pairs for number in pair])
     strengths = np.zeros((2, len(pairs)))
     for k, (a, b) in enumerate(pairs):
         for row, value in enumerate((-PROBE_VALUE, PROBE_VALUE)):

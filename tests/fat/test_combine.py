@@ -27,6 +27,8 @@ PLACES = {
     "2.8": (0.1, -GAP / 2),
     "3.1": (0.3, 0.55),
     "3.3": (0.3, 0.45),
+    "4.1": (0.15, 0.8),
+    "4.2": (-0.15, 0.8),
     "8.1": (0.0, 0.08),
     "8.2": (0.0, -0.08),
     "8.3": (0.25, 0.0),
@@ -65,6 +67,8 @@ def small_face(tie: float = 1.0, contour_tie: float = 0.0) -> AnimatableFace:
         one_point(53, p2_4=tie),
         one_point(19, (-400, 0, 256, 512, 1024)),
         one_point(21, (0, 300, 600)),
+        one_point(37),
+        one_point(38),
         FaceDefTable(2, 1, (squint,)),
     )
     return AnimatableFace(FaceScene((Shape("skin", mesh),)), points, FaceDefTables(tables), FAPU)
@@ -144,6 +148,17 @@ def test_lids_leave_room_for_an_expression() -> None:
     assert squinted["3.3"][1] == pytest.approx(PLACES["3.3"][1] + 0.04 * 1.0, abs=1e-8)
 
 
+def test_brows_squeeze_the_skin_between_them_to_half_its_width() -> None:
+    face = small_face()
+    meet = 0.5 * 0.3 * 1024 / FAPU.es0
+    assert amount(face, {37: 100, 38: 100}, 37) == pytest.approx(100)
+    squeezed = moved(face, {37: 400, 38: 400})
+    assert squeezed["4.1"][0] == pytest.approx(0.075)
+    assert squeezed["4.2"][0] == pytest.approx(-0.075)
+    assert amount(face, {37: meet + 50, 38: 25}, 37) == pytest.approx((meet + 25) * (meet + 50) / (meet + 75))
+    assert amount(face, {37: -400, 38: -400}, 38) == pytest.approx(-400)
+
+
 def test_lips_meet_in_contact() -> None:
     face = small_face()
     crossed = moved(face, {4: 300, 5: 300}, ())
@@ -209,18 +224,18 @@ def test_frames_and_poses_are_combined_alike() -> None:
     np.testing.assert_allclose(batch[2], player.pose({k: v // 2 for k, v in values.items()}).world(), atol=1e-12)
 
 
-LIPS_AND_LIDS = (3, 4, 5, 6, 8, 10, 19, 21, 51, 52, 53)
+COMBINED = (3, 4, 5, 6, 8, 10, 19, 21, 37, 38, 51, 52, 53)
 
 
 @settings(max_examples=150, deadline=None)
 @given(
-    st.lists(st.integers(-600, 600), min_size=len(LIPS_AND_LIDS), max_size=len(LIPS_AND_LIDS)),
-    st.sampled_from(LIPS_AND_LIDS),
+    st.lists(st.integers(-600, 600), min_size=len(COMBINED), max_size=len(COMBINED)),
+    st.sampled_from(COMBINED),
     st.sampled_from([0.0, 0.4, 1.0]),
 )
 def test_a_small_change_of_a_value_is_a_small_change_of_the_face(given: list[int], which: int, tie: float) -> None:
     face = small_face(tie, tie)
-    values = dict(zip(LIPS_AND_LIDS, given, strict=True))
+    values = dict(zip(COMBINED, given, strict=True))
     near = {**values, which: values[which] + 0.01}
     step = np.abs(Player(face).pose(near).world() - Player(face).pose(values).world()).max()
     # No rule answers to a change of a value with more than a few times as much.
@@ -274,6 +289,18 @@ def test_the_published_combination_tears_no_lip() -> None:
     skin = face.scene.shape("skin").mesh
     offsets = world["skin"] - face.scene.world_vertices("skin")
     assert flips(face.scene.world_vertices("skin"), skin.triangles, offsets) <= 0.5
+
+
+def test_all_brows_together_fold_no_more_than_alone() -> None:
+    face = source()
+    skin = face.scene.shape("skin").mesh
+    rest = face.scene.world_vertices("skin")
+    folded = {}
+    for name, faps in (("left", {37: 300}), ("both", {37: 300, 38: 300}), ("all", dict.fromkeys(range(31, 39), 300))):
+        offsets = Player(face).pose(faps).world_shapes()["skin"] - rest
+        folded[name] = flips(rest, skin.triangles, offsets)
+    assert folded["both"] <= min(0.1, folded["left"])
+    assert folded["all"] <= 0.5
 
 
 def test_all_lips_pressed_together_on_the_source_meet() -> None:
