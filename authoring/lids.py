@@ -70,9 +70,16 @@ STILL_POINTS = (
 LAYER = 0.02
 """A lid clears the ball by no more than this, in radii; by less where it is nearer at rest."""
 
-TAPER, WIDE = 0.06, 0.4
-"""Share of the eye's width over which the turn grows from the corner on, where both lids are one skin: of a rim, and
-of skin that hardly follows it."""
+FADES = 0.3
+"""Beyond the corners of the eye a turn fades over this share of the eye's width."""
+
+EVEN = 0.2
+"""Over this share of the eye's width the turn is evened out along x, in skin that follows less than AT_RIM."""
+
+AT_RIM = 0.75
+
+GRID = 256
+"""Places along x at which the turn is held."""
 
 SINKS = 0.6
 """A closed lid gives up this share of the distance by which its rim stands farther out than the other one, so that
@@ -94,7 +101,8 @@ class Lid:
     eye, part : of `cloning.rims`; part 0 upper, 1 lower.
     ball : the eyeball.
     slices : (s,) x of the rim, from corner to corner.
-    rims : (2, s) heights of the own and of the other rim over the middle of the ball.
+    rims : (2, s) heights of the own and of the other rim over the middle of the ball; at the corners, where both are
+        one, the other one is taken from beside them, so that corners follow and blunt ones close as well.
     reach : (2, s) distance of these rims from the axis through the middle of the ball.
     closing, opening : (n,) share of the rim's turn that each vertex of the skin follows.
     """
@@ -135,16 +143,26 @@ class Lid:
         angles: Floats = sines[0] - sines[1]
         return angles
 
-    def _width(self, x: Floats, share: Floats) -> Floats:
-        """1 along the lid, falling to 0 at the corners of the eye, for vertices (n,) at x."""
+    def _turn(self, x: Floats, share: Floats, value: float) -> Floats:
+        """(n,) angle of the whole lid for vertices at x: the rim's at the rim, evened out along x away from it."""
+        from scipy.ndimage import gaussian_filter1d
+
         first, last = self.slices[0], self.slices[-1]
-        taper = TAPER + (WIDE - TAPER) * (1.0 - share)
-        return _smoothstep(np.minimum(x - first, last - x) / (taper * (last - first)))
+        fades = FADES * (last - first)
+        grid = np.linspace(first - 2.0 * fades, last + 2.0 * fades, GRID)
+        beyond = np.maximum(np.maximum(first - grid, grid - last), 0.0)
+        sharp = np.interp(grid, self.slices, self.angles(value)) * _smoothstep(1.0 - beyond / fades)
+        even = gaussian_filter1d(sharp, EVEN * (last - first) / (grid[1] - grid[0]), mode="constant")
+        at_rim = _smoothstep((share - AT_RIM) / (1.0 - AT_RIM))
+        angle: Floats = at_rim * np.interp(x, grid, sharp) + (1.0 - at_rim) * np.interp(x, grid, even)
+        return angle
 
     def _turned(self, places: Floats, share: Floats, value: float, scale: tuple[float, float]) -> Floats:
         """Offsets (n, 3) of places that follow a share of the turn of the rim at their x."""
-        follows = share * self._width(places[:, 0], share)
-        turn = scale[0] * follows * np.interp(places[:, 0], self.slices, self.angles(value))
+        turn = scale[0] * share * self._turn(places[:, 0], share, value)
+        first, last = self.slices[0], self.slices[-1]
+        beyond = np.maximum(np.maximum(first - places[:, 0], places[:, 0] - last), 0.0)
+        follows = share * _smoothstep(1.0 - beyond / (FADES * (last - first)))
         _, y, z = (places - self.middle).T
         nearer = 1.0 - follows * np.interp(places[:, 0], self.slices, self._sink(value)) / np.hypot(y, z)
         cosine, sine = nearer * np.cos(turn) - 1.0, nearer * np.sin(turn)
@@ -170,7 +188,7 @@ class Lid:
             turned = self._turned(skin.vertices[vertices], share[vertices], value, (scale, 0.0))
             return float(weights @ turned[:, 1]) - wanted
 
-        turn = float(np.abs(np.interp(skin.vertices[vertices, 0], self.slices, self.angles(value))).max())
+        turn = float(np.abs(self._turn(skin.vertices[vertices, 0], share[vertices], value)).max())
         most = FARTHEST / turn
         if missing(0.0) * missing(most) < 0.0:
             return float(brentq(missing, 0.0, most, xtol=1e-13)), 0.0
@@ -262,6 +280,9 @@ def _lid(face: PreparedFace, fap_id: int) -> Lid | None:
     corners = np.array([face.skin.positions[k] for k in EYES[side][0]])
     own, other = (_rim_line(eye, k, corners) - center for k in (part, 1 - part))
     heights = np.stack([own[:, 1], np.interp(own[:, 0], other[:, 0], other[:, 1])])
+    way = (1.0, -1.0)[part]
+    for end, inner in ((0, 1), (-1, -2)):
+        heights[1, end] = heights[0, end] + way * min(way * (heights[1, inner] - heights[0, end]), 0.0)
     reach = np.stack([np.hypot(*own[:, 1:].T), np.interp(own[:, 0], other[:, 0], np.hypot(*other[:, 1:].T))])
     nothing = np.zeros(face.skin.vertex_count)
     found = Lid(face, fap_id, eye, part, near[0], own[:, 0] + center[0], heights, reach, nothing, nothing)
