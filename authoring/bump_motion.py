@@ -7,7 +7,8 @@ and a still feature point becomes thin there, but does not fold over as it would
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -23,8 +24,8 @@ from cloning.prepare import PreparedFace
 from fba.arrays import Floats
 from fba.faps import fap
 
-STEP = 0.2
-"""Longest step, as a share of the bump's radius: bumps are no steeper than about 4 in a radius, so none folds."""
+STEP = 0.5
+"""Longest step, as a share of the way to the nearest point that must stay: within it no bump folds the skin."""
 
 LEVEL = 1e-9
 """Depths below this, in eye separations, are rounding."""
@@ -92,7 +93,7 @@ class BumpMotion:
             shift, field, reached = np.zeros_like(rest), np.zeros_like(rest), 0
             for border in sorted((b for b in self.borders if b * sign > 0), key=abs):
                 length = (border - reached) * unit
-                steps = int(np.ceil(abs(length) / (STEP * bump.radius) - 1e-9))
+                steps = int(np.ceil(abs(length) / bump.step - 1e-9))
                 for _ in range(steps):
                     weight = bump.weight(rest + field) if shift.any() else at_rest
                     shift = shift + (length / steps) * weight[:, None] * way
@@ -119,10 +120,13 @@ class BumpMotion:
         radius = self.reach * float(np.linalg.norm(a - b))
         wanted = {self.own: 1.0, **{k: 1.0 for k in self.tied if k in face.skin.points}}
         free = maker.within(tuple(wanted), radius)
-        pins = [k for axis in range(3) if way[axis] for k in pinned(axis, tuple(wanted))]
+        pins = [*(k for axis in range(3) if way[axis] for k in pinned(axis, tuple(wanted))), *self.pins]
         more = [] if self.shape is None else self.shape(face, wanted)
-        goals = maker.goals(wanted, [*pins, *self.pins], more)
-        return _Bump(maker, goals, maker.patch(free), radius, carrier(face) if self.carries else None)
+        goals = maker.goals(wanted, pins, more)
+        at, points = face.skin.positions, face.skin.points
+        near = [k for k in pins if k in points and free[points[k][0]].all()]
+        step = STEP * min([radius, *(float(np.linalg.norm(at[k] - at[self.own])) for k in near)])
+        return _Bump(maker, goals, maker.patch(free), step, carrier(face) if self.carries else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,19 +137,19 @@ class _Bump:
     ----------
     goals : what it must be at places.
     patch : the skin that may move.
-    radius : in eye separations.
+    step : longest way to go at once, in eye separations.
     carry : what hidden skin does, see `carrier`; None if it goes its own way.
     """
 
     maker: Bumps
     goals: Goals
     patch: Patch
-    radius: float
+    step: float
     carry: Any | None
 
     def weight(self, places: Floats) -> Floats:
         """The bump (n,) of the skin as it lies by now."""
-        weight = self.patch.weight(self.goals, places)
+        weight: Floats = self.patch.weights(self.goals, places)[:, 0]
         return weight if self.carry is None else self.carry @ weight
 
     def level(self, field: Floats) -> Floats:
@@ -154,10 +158,17 @@ class _Bump:
         deep = self.maker.surface.point_matrix(keys) @ field[:, 2]
         if np.abs(deep).max(initial=0.0) < LEVEL:
             return field
-        goals = self.maker.goals({k: float(d) for k, d in zip(keys, deep, strict=True)})
         leveled = field.copy()
-        leveled[:, 2] -= self.patch.weight(goals, self.maker.surface.vertices)
+        leveled[:, 2] -= self._depths @ deep
         return leveled
+
+    @cached_property
+    def _depths(self) -> Floats:
+        """(n, k) bumps at the feature points whose depth other FAPs move, each 0 at the other ones."""
+        surface = self.maker.surface
+        keys = [k for k in pinned(2) if k in surface.points]
+        goals = replace(self.maker.goals(dict.fromkeys(keys, 1.0)), values=np.eye(len(keys)))
+        return self.patch.weights(goals, surface.vertices)
 
 
 _MADE: WeakKeyDictionary[PreparedFace, dict[BumpMotion, dict[int, Offsets]]] = WeakKeyDictionary()

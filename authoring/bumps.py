@@ -56,7 +56,7 @@ class Goals:
     Attributes
     ----------
     rows : (k, g) sparse, evaluates a weight there.
-    values : (k,) wanted.
+    values : (k, m) wanted, of m weights at once.
     softness : (k,) 0 where the weight must be exact.
     """
 
@@ -145,7 +145,7 @@ class Bumps:
         extra = coo_array((weights, (row, column)), shape=(len(more), n))
         spread = csr_array((np.ones(n), (np.arange(n), self._group)))
         rows = (vstack([self.surface.point_matrix(keys), extra]) @ spread).tocsr()
-        return Goals(rows, np.array(values), np.repeat([0.0, SOFT], [len(keys), len(more)]))
+        return Goals(rows, np.array(values)[:, None], np.repeat([0.0, SOFT], [len(keys), len(more)]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,8 +167,8 @@ class Patch:
     corners: Ints
     columns: Ints
 
-    def weight(self, goals: Goals, lying: Floats) -> Floats:
-        """The smoothest weight (n,) with given values at places of the skin.
+    def weights(self, goals: Goals, lying: Floats) -> Floats:
+        """The smoothest weights (n, m) with given values at places of the skin.
 
         Parameters
         ----------
@@ -177,7 +177,7 @@ class Patch:
         """
         from scipy.sparse.linalg import splu
 
-        values = np.zeros(int(self.group.max()) + 1)
+        values = np.zeros((int(self.group.max()) + 1, goals.values.shape[1]))
         rows = goals.rows[:, self.places]
         touched = np.asarray(abs(rows).sum(axis=1)).ravel() > UNTOUCHED
         if not touched.any():
@@ -190,10 +190,10 @@ class Patch:
         between = rows @ follow
         size = np.sqrt(np.diag(between))
         between = between / np.outer(size, size) + np.diag(goals.softness[touched])
-        heights = np.linalg.lstsq(between, wanted / size, rcond=DEPENDENT)[0] / size
+        heights = np.linalg.lstsq(between, wanted / size[:, None], rcond=DEPENDENT)[0] / size[:, None]
         values[self.places] = follow @ heights
-        weight: Floats = values[self.group]
-        return weight
+        weights: Floats = values[self.group]
+        return weights
 
     def _bending(self, lying: Floats) -> Any:
         """(k, k) sparse: ``w @ bending @ w`` is the bending of a weight over the places, 0 around them."""

@@ -17,8 +17,8 @@ from cloning.surface import Surface
 from cloning.visibility import visible
 from fba.arrays import Bools, Floats
 
-NEIGHBOURS = 12
-"""Vertices of the outer skin whose motions a hidden vertex takes the mean of."""
+NEIGHBOURS = 80
+"""Vertices of the outer skin whose motions a hidden vertex takes the mean of; fewer fold the lining on dense meshes."""
 
 BEHIND = (0.2, 0.6)
 """Hidden skin up to the first distance behind the outer one (eye separations) goes all the way along, beyond the
@@ -55,7 +55,7 @@ def _carrier(face: PreparedFace) -> Any:
         return diags_array(np.ones(len(places)))
     found = cKDTree(places[outer]).query(places[hidden], k=min(NEIGHBOURS, len(outer)))
     away, near = (np.asarray(part).reshape(len(hidden), -1) for part in found)
-    share = 1.0 / np.maximum(away, 1e-6) ** 2
+    share = 1.0 / np.maximum(away**2 + away[:, :1] ** 2, 1e-12)
     inside = dijkstra(face.skin.graph, indices=outer, min_only=True, limit=DEEP[1])[hidden]
     deep = _rise(inside, DEEP)
     share *= (deep * (1.0 - _rise(away[:, 0], BEHIND)) / share.sum(axis=1))[:, None]

@@ -13,7 +13,7 @@ from cloning.prepare import PreparedFace
 PUFF_BORDERS = (-900, -600, -300, 300, 600, 900)
 LIFT_BORDERS = (300, 600)
 
-PUFF, LIFT = 2.0, 2.6
+PUFF, LIFT = 1.9, 2.2
 """Reach in eye widths: a puffed cheek from the cheekbone to the jaw, a lifted one from the lower lid to the mouth."""
 
 _EYES = (("3.7", "3.11"), ("3.8", "3.12"))

@@ -44,7 +44,7 @@ class Ear:
             rim = tuple(k for k in (self.top, self.back, self.bottom) if k in face.skin.points)
             free = maker.within(rim, REACH * float(np.linalg.norm(at[self.top] - at[self.lower])))
             goals = maker.goals(dict.fromkeys(rim, 1.0))
-            made[self] = maker.patch(free).weight(goals, face.skin.vertices)
+            made[self] = maker.patch(free).weights(goals, face.skin.vertices)[:, 0]
         return made[self]
 
     def raised(self, face: PreparedFace, length: float) -> Floats:
@@ -53,18 +53,19 @@ class Ear:
         return field
 
     def pulled(self, face: PreparedFace, length: float) -> Floats:
-        """The ear turned about its attachment until its back lies a length (along +x) farther to the side."""
+        """The ear turned about its attachment until its back lies a length (along +x) farther to the side.
+
+        The axis is vertical, through the middle of the attachment, so that no height changes.
+        """
         at = face.skin.positions
-        axis = at[self.upper] - at[self.lower]
-        axis /= np.linalg.norm(axis)
-        arm = at[self.back] - at[self.lower]
-        arm -= (arm @ axis) * axis
+        axis, middle = np.array([0.0, 1.0, 0.0]), 0.5 * (at[self.upper] + at[self.lower])
+        arm = (at[self.back] - middle) * [1.0, 0.0, 1.0]
         angle = _angle(arm, axis, length)
         weight = self.weight(face)
-        local = face.skin.vertices - at[self.lower]
+        local = face.skin.vertices - middle
         turned = _turn(local, axis, weight * angle) - local
         missing = length - float(_turn(arm[None], axis, np.array([angle]))[0, 0] - arm[0])
-        away = np.clip((local - np.outer(local @ axis, axis)) @ arm / float(arm @ arm), 0.0, 1.0)
+        away = np.clip(local @ arm / float(arm @ arm), 0.0, 1.0)
         field: Floats = turned + missing * (weight * away)[:, None] * [1.0, 0.0, 0.0]
         return field
 

@@ -7,6 +7,7 @@ together that they move as one (FAPs 6 and 53, 7 and 54, 12 and 59, 13 and 60).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from authoring.bump_motion import BumpMotion
 from authoring.construction import Construction
@@ -23,17 +24,24 @@ INNER, OUTER = 0.6, 0.55
 PUSH = 0.6
 """A lip is pushed as a whole; its corners hardly go along."""
 
-STRETCH, RAISE = 1.9, 0.9
+STRETCH, RAISE = 1.6, 0.9
 """A stretched corner pushes the whole cheek before it; a raised one only the skin between nose and jaw."""
 
-_CORNERS = {6: "8.3", 7: "8.4", 53: "2.4", 54: "2.5", 12: "8.3", 13: "8.4", 59: "2.4", 60: "2.5"}
+_OUTER = {6: "8.3", 7: "8.4", 12: "8.3", 13: "8.4"}
+_TIED = {53: 6, 54: 7, 59: 12, 60: 13}
+"""The outer corner's FAP -> the inner one's, whose motion is the same."""
 
 _MOTIONS = (
     *(BumpMotion(k, HEIGHTS, MOUTH, INNER, shape=lip_places) for k in (4, 5, 8, 9, 10, 11)),
     *(BumpMotion(k, HEIGHTS, MOUTH, OUTER, shape=lip_places) for k in (51, 52, 55, 56, 57, 58)),
     *(BumpMotion(k, DEPTHS, MOUTH, PUSH) for k in (16, 17)),
-    *(BumpMotion(k, HEIGHTS, MOUTH, STRETCH, (_CORNERS[k],), slides=True, carries=True) for k in (6, 7, 53, 54)),
-    *(BumpMotion(k, HEIGHTS, MOUTH, RAISE, (_CORNERS[k],), slides=True, shape=lip_places) for k in (12, 13, 59, 60)),
+    *(BumpMotion(k, HEIGHTS, MOUTH, STRETCH, (_OUTER[k],), slides=True, carries=True) for k in (6, 7)),
+    *(BumpMotion(k, HEIGHTS, MOUTH, RAISE, (_OUTER[k],), slides=True, shape=lip_places) for k in (12, 13)),
 )
 
-CONSTRUCTIONS: Mapping[int, Construction] = {m.fap_id: m.construction for m in _MOTIONS}
+_OWN = {m.fap_id: m.construction for m in _MOTIONS}
+
+CONSTRUCTIONS: Mapping[int, Construction] = {
+    **_OWN,
+    **{outer: replace(_OWN[inner], fap_id=outer) for outer, inner in _TIED.items()},
+}
