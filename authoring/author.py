@@ -14,6 +14,7 @@ from authoring.from_units import UnitMaker
 from authoring.high_level import HighLevel, high_level_keys
 from authoring.low_level import LowLevel, Made
 from authoring.names import Meaning
+from authoring.open_jaw import strict
 from authoring.recipes import TIED_FAPS, TIED_NOTE
 from authoring.report import AuthorReport, Entry, Step
 from authoring.units import FaceShapes, sort_shapes
@@ -24,6 +25,7 @@ from fat.conformance import conformance
 from fat.evaluate import Player
 from fat.face import AnimatableFace
 from fat.motion import FaceMotion
+from fat.open_jaw import JAW, NOTE, open_jaw_mode
 from fat.rig import EYE_FAPS, HEAD_FAPS, RigTables, rig_eye, rig_head
 from fat.tables import table_name
 from fba.arrays import Floats
@@ -88,18 +90,16 @@ def author(
     made = stages.each("FAPs", [n for n in LOW_LEVEL_FAPS if n not in ROTATIONS], low.make)
     motions = [motion for one in made.values() for motion in one.motions]
     rigged, transforms = _rig(face)
-    notes = _notes(made, open_jaw)
+    notes = _notes(made)
     draft = _assembled(face, rigged, motions, transforms, notes)
     high = HighLevel(fitting, found, Player(draft))
     posed = stages.each("visemes and expressions", high_level_keys(), lambda key: high.make(*key))
     motions += [motion for motion, _, _ in posed.values() if motion is not None]
-    done = _assembled(face, rigged, motions, transforms, notes)
-    if open_jaw == "strict":
-        done = _strict(done)
+    done = _with_jaw(_assembled(face, rigged, motions, transforms, notes), open_jaw)
     entries = stages.run("measuring", lambda: _entries(done, made, posed, transforms))
     report = AuthorReport(
         scene.name,
-        open_jaw,
+        done.notes.get(NOTE, ""),
         entries,
         _used(found),
         found.ignored,
@@ -187,20 +187,19 @@ def _assembled(
     return AnimatableFace(rigged, face.points, tables, face.fapu, notes)
 
 
-def _notes(made: Mapping[int, Made], open_jaw: OpenJaw) -> dict[str, str]:
-    notes = {"generator": "fba author"}
-    if made[3].motions:
-        notes["open_jaw"] = "as given" if made[3].steps[-1].how == "given" else open_jaw
-    for number in TIED_FAPS:
-        if made[number].motions and made[number].steps[-1].how != "given":
-            notes[table_name(number)] = TIED_NOTE
-    return notes
+def _notes(made: Mapping[int, Made]) -> dict[str, str]:
+    tied = {table_name(n): TIED_NOTE for n in TIED_FAPS if made[n].motions and made[n].steps[-1].how != "given"}
+    return {"generator": "fba author", **tied}
 
 
-def _strict(face: AnimatableFace) -> AnimatableFace:
-    from authoring.open_jaw import strict
-
-    return replace(strict(face), notes={**face.notes, "open_jaw": "strict"})
+def _with_jaw(face: AnimatableFace, wanted: OpenJaw) -> AnimatableFace:
+    """The face with the open_jaw that is wanted, and a note of what it really does."""
+    if face.tables.get(JAW) is None:
+        return face
+    if wanted == "strict":
+        return strict(face)
+    mode = open_jaw_mode(face)
+    return face if mode is None else replace(face, notes={**face.notes, NOTE: mode})
 
 
 def _entries(

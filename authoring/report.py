@@ -58,7 +58,7 @@ class AuthorReport:
 
     Attributes
     ----------
-    open_jaw : "practical" or "strict".
+    open_jaw : "practical" or "strict", as the finished tables have it; "" without a jaw.
     used : shape -> what it was taken for.
     ignored : shape -> why it was not used.
     """

@@ -113,4 +113,5 @@ def _summary(made: AuthorReport, face: AnimatableFace, output: Path) -> None:
             out.print(f"{text}: {', '.join(e.name for e in entries)}", soft_wrap=True)
     for entry in made.missing:
         out.print(f"missing: {entry.name}: {entry.why}", soft_wrap=True)
-    out.print(f"{output}: {len(face.tables)} tables for {face.scene.vertex_count} vertices, open_jaw {made.open_jaw}")
+    jaw = f", open_jaw {made.open_jaw}" if made.open_jaw else ""
+    out.print(f"{output}: {len(face.tables)} tables for {face.scene.vertex_count} vertices{jaw}")

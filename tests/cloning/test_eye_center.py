@@ -14,9 +14,7 @@ def ball(least: float) -> Floats:
     """A sphere of radius 2 around CENTER, only where z is above a height."""
     angles = np.linspace(0.0, np.pi, 13)
     turns = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
-    rings = [
-        [2.0 * np.sin(a) * np.cos(t), 2.0 * np.sin(a) * np.sin(t), 2.0 * np.cos(a)] for a in angles for t in turns
-    ]
+    rings = [[2.0 * np.sin(a) * np.cos(t), 2.0 * np.sin(a) * np.sin(t), 2.0 * np.cos(a)] for a in angles for t in turns]
     places = CENTER + np.array(rings)
     return places[places[:, 2] >= CENTER[2] + least - 1e-9]
 
