@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from fat.evaluate import Player
 from fat.face import AnimatableFace
+from fat.open_jaw import open_jaw_mode
 from fat.profiles.tables import Profile, ProfileShape, profile_table
 from fat.tables import table_name
 from fba.arrays import Floats
@@ -22,15 +24,22 @@ RULES = ("corners",)
 """Of `fat.combine`: where inner and outer lip corner are tied, the two FAPs of a shape move the corner once. The rest
 is the standard's sum: a shape such as mouthClose is meant to be added to others."""
 
+OPENING, CLOSING = "jawOpen", "mouthClose"
+"""ARKit's mouthClose is added to jawOpen and shuts the lips again."""
+
 _Key = tuple[int, int]
 
 
-def profile_shapes(face: AnimatableFace, profile: Profile) -> tuple[ShapeSet, list[Finding]]:
+def profile_shapes(
+    face: AnimatableFace, profile: Profile, shut: AnimatableFace | None = None
+) -> tuple[ShapeSet, list[Finding]]:
     """Evaluate every shape of a profile on a face, all its parts.
 
     Parameters
     ----------
     face : its tables make the shapes. FAPs that it has no tables for are left out of them.
+    shut : the same face with an open_jaw that leaves the lips (`authoring.open_jaw.strict`). Then mouthClose is what
+        keeps the lips of jawOpen together; without it, it is made of lip FAPs, which tear them.
 
     Returns
     -------
@@ -43,10 +52,12 @@ def profile_shapes(face: AnimatableFace, profile: Profile) -> tuple[ShapeSet, li
         If the face can show no shape of the profile, or its tables are damaged.
     """
     player = Player(face, rules=RULES)
+    strict = open_jaw_mode(face) == "strict"
     neutral = face.scene.world_neutral()
     names, deltas = [], []
     findings: list[Finding] = []
-    for shape in profile_table(profile):
+    for row in profile_table(profile):
+        shape = replace(row, faps=row.strict_faps) if strict and row.strict_faps else row
         wanted = _keys(shape)
         missing = [key for key in wanted if face.tables.get(*key) is None]
         if missing:
@@ -54,6 +65,10 @@ def profile_shapes(face: AnimatableFace, profile: Profile) -> tuple[ShapeSet, li
         if shape.still or len(missing) < len(wanted):
             names.append(shape.name)
             deltas.append(to_file_order(face.scene, _world(player, shape) - neutral))
+    if shut is not None and CLOSING in names and OPENING in names:
+        opening = next(row for row in profile_table(profile) if row.name == OPENING)
+        closing = _world(Player(shut, rules=RULES), opening) - _world(player, opening)
+        deltas[names.index(CLOSING)] = to_file_order(face.scene, closing)
     if not any(map(np.any, deltas)):
         raise FaceDefTablesError(
             f"the tables of '{face.scene.name}' move none of the shapes of the profile '{profile}'; "

@@ -23,6 +23,7 @@ class ProfileShape:
     ----------
     name : as files of the profile call the shape.
     faps : FAP 3..68 -> value.
+    strict_faps : the same for a face whose open_jaw leaves the lips (`fat.open_jaw`), where that differs.
     viseme : number 1..14, shown in full; 0 = none.
     expression, intensity : number 1..6 and 0..63; 0 = none.
     residuals : what is left over on the faces it was measured on, e.g. ``{"makehuman_fp": 0.22}``.
@@ -34,6 +35,7 @@ class ProfileShape:
     expression: int = 0
     intensity: int = 0
     residuals: Mapping[str, float] = field(default_factory=dict)
+    strict_faps: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def still(self) -> bool:
@@ -64,7 +66,7 @@ def profile_table(profile: Profile) -> tuple[ProfileShape, ...]:
     """All shapes of a profile in its own order.
 
     >>> profile_table("oculus")[1]
-    ProfileShape(name='viseme_PP', faps={}, viseme=1, expression=0, intensity=0, residuals={})
+    ProfileShape(name='viseme_PP', faps={}, viseme=1, expression=0, intensity=0, residuals={}, strict_faps={})
     """
     return tuple(_shape(row) for row in _rows(profile))
 
@@ -97,7 +99,8 @@ def _shape(row: Mapping[str, str]) -> ProfileShape:
     faps |= {int(number): value for number, value in _pairs(row.get("faps", ""))}
     expression = int(row.get("expression") or 0)
     intensity = BLEND_MAX if expression else 0
-    return ProfileShape(row["shape"], faps, int(row.get("viseme") or 0), expression, intensity, _residuals(row))
+    strict = {int(number): value for number, value in _pairs(row.get("strict_faps", ""))}
+    return ProfileShape(row["shape"], faps, int(row.get("viseme") or 0), expression, intensity, _residuals(row), strict)
 
 
 def _by_name(name: str) -> ProfileShape:

@@ -26,12 +26,14 @@ def put_tables(path: Path, tables: Mapping[str, str]) -> None:
     """
     text = path.read_text("utf-8")
     for name, table in tables.items():
-        pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end {name} -->)", re.DOTALL)
-        if not pattern.search(text):
+        begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->"
+        before, opened, rest = text.partition(begin)
+        _, closed, after = rest.partition(end)
+        if not (opened and closed):
             raise InputFileError(
                 f"{path} has no place for the table '{name}'; add <!-- {name} --> and <!-- end {name} -->"
             )
-        text = pattern.sub(lambda found, table=table: f"{found[1]}{table}{found[2]}", text)
+        text = before + begin + table + end + after
     write_bytes(path, text.encode())
 
 

@@ -15,6 +15,8 @@ from fba.faps import Unit, fap
 from samples.build.arkit_anatomy import OUTER_CORNER, mirror_shape, mirrored, related
 from samples.build.known_shapes import COMPARED, TURNS, KnownShapes
 
+POINTS = 2.0
+"""Feature points count this many times the skin: they are what FAP values mean."""
 WORTH, WORTH_BACK = 0.01, 0.02
 """What a term must take off the sum of the two squared relative errors to stay: a FAP in a shape, a shape in a FAP."""
 SMALL, SMALL_BACK = 0.1, 0.05
@@ -209,7 +211,8 @@ def _system(
     blocks, goals = [], []
     for place, goal in enumerate(wanted):
         skin = known.judged(goal)
-        points, size = max(known.point_motion(goal), 1e-12), max(float(np.linalg.norm(goal[skin])), 1e-12)
+        points = max(known.point_motion(goal) / POINTS, 1e-12)
+        size = max(float(np.linalg.norm(goal[skin])), 1e-12)
 
         def rows(offsets: Floats, skin: Bools = skin, points: float = points, size: float = size) -> Floats:
             lengths = known.lengths(offsets)

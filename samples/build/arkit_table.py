@@ -10,11 +10,14 @@ import argparse
 import csv
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from authoring.open_jaw import strict
 from fat.face import AnimatableFace
+from fat.open_jaw import JAW
 from fat.profiles.names import ARKIT
 from fba.amplitudes import amplitudes
 from fba.arrays import Floats
@@ -42,6 +45,7 @@ FORWARD = f"""\
 # faps: FAP:value, in FAP units (ISO/IEC 14496-2; angles in 1e-5 rad); shown together and added, they come nearest to
 # the shape at weight 1. Fitted to MakeHuman's face units (CC0; faceunits01 in {WHEEL})
 # with the tables of the shipped source: bounded least squares over feature points and visible skin, both sides alike.
+# strict_faps: the same where open_jaw leaves the lips, as the standard has it; a practical one takes the lower lip along.
 # makehuman_fp: sum of errors / sum of motion over the feature points along the axes of all FAPs.
 # makehuman_dense: |shape - combination| / |shape| over the visible skin (tongue, eyeballs where the skin stays still).
 """
@@ -74,7 +78,7 @@ def main() -> None:
     args = parser.parse_args()
     known = makehuman_shapes(open_makehuman(args.wheel or download_wheel(args.cache)), read_face("default"))
     table = fit_table(known)
-    forward, backward = forward_rows(known, table), backward_rows(known, table)
+    forward, backward = forward_rows(known, table, strict_rows(known, table)), backward_rows(known, table)
     write_rows(DATA / "arkit.csv", FORWARD, with_other_faces(forward, read_rows(DATA / "arkit.csv")))
     write_rows(DATA / "arkit_from_faps.csv", BACKWARD, backward)
     put_tables(DOCS, {**tables_in_words(), "round trip": round_trip(known, table, backward)})
@@ -109,12 +113,26 @@ def fit_table(known: KnownShapes) -> dict[str, dict[int, int]]:
     return {name: found[name] for name in ARKIT}
 
 
-def forward_rows(known: KnownShapes, table: Mapping[str, Mapping[int, int]]) -> list[Row]:
-    """Rows of arkit.csv."""
+def strict_rows(known: KnownShapes, table: Mapping[str, Mapping[int, int]]) -> dict[str, dict[int, int]]:
+    """FAP values of the shapes that open the jaw, on the same face with lips that stay where they are."""
+    other = replace(known, face=strict(known.face))
+    return {name: shape_to_faps(other, name) for name, faps in table.items() if JAW in faps}
+
+
+def forward_rows(
+    known: KnownShapes, table: Mapping[str, Mapping[int, int]], other: Mapping[str, Mapping[int, int]]
+) -> list[Row]:
+    """Rows of arkit.csv.
+
+    Parameters
+    ----------
+    table, other : shape -> FAP values; `other` where open_jaw leaves the lips.
+    """
     rows = []
     for name, faps in table.items():
         left = residual(known, known.shapes[name], known.motion(faps))
-        rows.append({"shape": name, "faps": _joined(faps), **_residual_cells(known, left)})
+        row = {"shape": name, "faps": _joined(faps), "strict_faps": _joined(other.get(name, {}))}
+        rows.append({**row, **_residual_cells(known, left)})
     return rows
 
 

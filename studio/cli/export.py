@@ -88,14 +88,31 @@ def _export_profile(face: Path, output: Path, profile: Profile) -> None:
     require_folder(output)
     found = read_face(str(face))
     _refuse_broken(found, face)
-    shapes, findings = profile_shapes(found, profile)
+    shut, said = _shut(found) if profile == "arkit" else (None, [])
+    shapes, findings = profile_shapes(found, profile, shut)
     if stage:
         write_shape_set(found.scene, shapes, output)
     else:
         write_shapes(shapes, found.scene, output)
     out = console()
-    print_findings([*findings, *left_behind(found.scene, face, output)], out)
+    print_findings([*findings, *said, *left_behind(found.scene, face, output)], out)
     out.print(f"{output}: {len(shapes.names)} shapes of the profile '{profile}' for {len(shapes.neutral)} vertices")
+
+
+def _shut(face: AnimatableFace) -> tuple[AnimatableFace | None, list[Finding]]:
+    """The face with a jaw that leaves the lips; None where its own does already, or where it cannot be made."""
+    from authoring.open_jaw import strict
+    from fat.open_jaw import open_jaw_mode
+    from fba.errors import FbaError
+    from fba.findings import Finding
+
+    if open_jaw_mode(face) != "practical":
+        return None, []
+    try:
+        return strict(face), []
+    except FbaError as error:
+        text = f"mouthClose is made of lip FAPs, which tear the lips that it should shut: {error}"
+        return None, [Finding("warning", "profile-mouth-close", text, "mouthClose")]
 
 
 def _refuse_broken(face: AnimatableFace, path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 from pxr import Usd, UsdGeom, UsdSkel
 from typer.testing import CliRunner, Result
 
+from authoring.open_jaw import strict
 from fat.profiles import ARKIT, VRM, profile_shapes
 from formats import read_face, read_scene
 from formats.shapes import read_shapes
@@ -28,7 +29,8 @@ def test_an_npz_holds_the_shapes(tmp_path: Path) -> None:
     result = fba("export", "default", "-o", out, "--profile", "arkit")
     assert result.exit_code == Outcome.OK, result.output
     assert "shapes of the profile 'arkit'" in result.stdout
-    made, _ = profile_shapes(read_face("default"), "arkit")
+    face = read_face("default")
+    made, _ = profile_shapes(face, "arkit", strict(face))
     found = read_shapes(out, read_scene(default_source()))
     assert found.names == made.names
     assert set(found.names) <= set(ARKIT)
