@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,18 +76,11 @@ def side_mask(head: Head, edge: Edge) -> Bools:
     return mask
 
 
-def edge_line(head: Head, edge: Edge, mask: Bools, span: Floats, offsets: Floats | None = None) -> Line:
-    """Find an edge in the slices x = span[i] of the neutral or displaced skin of a head.
-
-    Parameters
-    ----------
-    mask : (n,) of `side_mask`.
-    offsets : (n, 3) displacement of the skin; the guide goes along.
-    """
-    skin = head.parts["skin"] if offsets is None else head.parts["skin"] + offsets
+def edge_line(head: Head, edge: Edge, mask: Bools, span: Floats) -> Line:
+    """Find an edge in the slices x = span[i] of the skin of a head; mask (n,) of `side_mask`."""
     triangles = head.scene.shape("skin").mesh.triangles
-    guide = _guide(head, edge.guide, offsets)
-    return surface_edge(skin, triangles[mask[triangles].all(axis=1)], guide, span, edge, head.fapu.es0)
+    guide = np.array([head.positions[key] for key in edge.guide])
+    return surface_edge(head.parts["skin"], triangles[mask[triangles].all(axis=1)], guide, span, edge, head.fapu.es0)
 
 
 def surface_edge(skin: Floats, triangles: Ints, guide: Floats, span: Floats, edge: Edge, es0: float) -> Line:
@@ -107,12 +99,3 @@ def surface_edge(skin: Floats, triangles: Ints, guide: Floats, span: Floats, edg
         best = int(np.argmin(np.where(close, edge.sign * cut[:, 1], np.inf)))
         points[row], edges[row], shares[row] = cut[best], (a[best], b[best]), share[best]
     return Line(points, edges, shares)
-
-
-def _guide(head: Head, keys: Sequence[str], offsets: Floats | None) -> Floats:
-    rows = []
-    for key in keys:
-        point = head.points[key]
-        moved = 0.0 if offsets is None else np.asarray(point.weights) @ offsets[list(point.vertices)]
-        rows.append(head.positions[key] + moved)
-    return np.array(rows)

@@ -9,7 +9,7 @@ import numpy as np
 from fat.quality import mirror_map
 from fba.arrays import Bools, Ints
 from fba.feature_points import FeaturePoint
-from samples.build.colors import MOUTH, skin_materials
+from samples.build.colors import LIP, MOUTH, skin_materials
 from samples.build.crop import HeadCrop, Part
 from samples.build.fairing import Fairing
 from samples.build.head import Head
@@ -18,10 +18,10 @@ from samples.build.refine import refine
 from samples.build.surface import nearest_facing
 from samples.build.symmetry import CLOSE, mirrored_points, mirrored_polygons
 
-MOVES = 0.01
+MOVES = 0.02
 """Polygons that some face unit moves farther than this (ES0) become finer ..."""
-LONG = 0.05
-"""... if they have a longer edge than this (ES0); those around lids and lip corners are small already."""
+LONG = 0.06
+"""... if they have a longer edge than this (ES0), or belong to the lips; those around the lids are small already."""
 SOCKET = 0.99
 """Skin nearer to the centre of an eyeball than this (radii) lines the socket and stays coarse."""
 RIMS = ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9", *(f"8.{k}" for k in range(1, 11)))
@@ -56,8 +56,9 @@ def levels(head: Head) -> Ints:
     following[mesh.offsets[1:] - 1] = starts
     sides = mesh.vertices[mesh.indices[following]] - mesh.vertices[mesh.indices]
     long = np.maximum.reduceat(np.linalg.norm(sides, axis=1), starts) > LONG * es0
-    lining = np.logical_and.reduceat(_socket(head)[mesh.indices], starts) | (skin_materials(head) == MOUTH)
-    chosen: Bools = np.logical_or.reduceat(moves[mesh.indices], starts) & long & ~lining
+    materials = skin_materials(head)
+    lining = np.logical_and.reduceat(_socket(head)[mesh.indices], starts) | (materials == MOUTH)
+    chosen: Bools = np.logical_or.reduceat(moves[mesh.indices], starts) & (long | (materials == LIP)) & ~lining
     return chosen.astype(np.int32)
 
 

@@ -1,4 +1,4 @@
-"""Distances along a mesh, and smooth local kernels made of them."""
+"""Distances along a mesh, and the smooth step."""
 
 from __future__ import annotations
 
@@ -8,10 +8,6 @@ from numpy.typing import NDArray
 from fba.arrays import Floats
 from fba.feature_points import FeaturePoint
 from fba.mesh import PolyMesh
-
-SIGMA = 0.16
-"""Width of a correction kernel in eye separations; with `CUT` the values that were measured to disturb least."""
-CUT = 0.45
 
 
 def distances(mesh: PolyMesh, points: list[FeaturePoint], limit: float = np.inf) -> Floats:
@@ -33,14 +29,6 @@ def distances(mesh: PolyMesh, points: list[FeaturePoint], limit: float = np.inf)
     graph = coo_array((np.concatenate([length, w]), (tail, head)), shape=(size, size)).tocsr()
     found: Floats = dijkstra(graph, directed=True, indices=np.arange(n, size), limit=limit)[:, :n]
     return found
-
-
-def kernel(distance: Floats, sigma: float, cut: float) -> Floats:
-    """Gaussian of a distance, brought smoothly to 0 at `cut`; 1 at distance 0."""
-    at_cut = np.exp(-0.5 * (cut / sigma) ** 2)
-    value = np.exp(-0.5 * (np.minimum(distance, cut) / sigma) ** 2)
-    fall: Floats = np.clip((value - at_cut) / (1.0 - at_cut), 0.0, 1.0)
-    return fall
 
 
 def smoothstep(value: Floats) -> Floats:

@@ -44,9 +44,9 @@ def neutral(head: Head, opening: float) -> Head:
     head = _lids(replace(head, placed={**head.placed, **lid_points(head)}), opening)
     if head.fairing is not None:
         for _ in range(SOFT_PASSES):
-            head = head.moved({"skin": head.fairing.spread(close_lips(head, soft=True))})
+            head = head.moved({"skin": head.fairing.spread(close_lips(head))})
     for _ in range(PASSES):
-        head = head.moved({"skin": close_lips(head, soft=head.fairing is not None)})
+        head = head.moved({"skin": close_lips(head)})
     head = replace(head, placed={**head.placed, **lip_points(head)})
     return _lashes(_teeth(head))
 
@@ -85,35 +85,25 @@ def _move(head: Head, key: str, skin_offsets: Floats) -> Floats:
     return moved
 
 
-def close_lips(head: Head, motion: Floats | None = None, gaps: bool = True, soft: bool = False) -> Floats:
-    """Offsets (n, 3) of the skin that bring both lips into contact.
+def close_lips(head: Head) -> Floats:
+    """Offsets (n, 3) of the skin that bring both lips into contact on a level line at the height of the corners.
 
-    Parameters
-    ----------
-    motion : (n, 3) offsets of a pose, whose lips meet half-way; None = the neutral face, whose lips meet on a level
-        line at the height of the corners.
-    gaps : close gaps too; False only parts lips that run through each other.
-    soft : let the corners keep their height, and fade beyond them instead of ending there.
+    On a finer skin the corners keep their height, and the motion fades beyond them instead of ending there.
     """
-    p, fapu = head.positions, head.fapu
-    skin = head.parts["skin"] if motion is None else head.parts["skin"] + motion
+    p, fapu, soft = head.positions, head.fapu, head.fairing is not None
+    skin = head.parts["skin"]
     ends = [head.points[k].vertices[0] for k in ("2.5", "2.4")]
     span = np.linspace(skin[ends[0], 0], skin[ends[1], 0], 161)[1:-1]
     sides = {name: side_mask(head, edge) for name, edge in LIPS.items()}
-    lines = {name: edge_line(head, edge, sides[name], span, motion).points for name, edge in LIPS.items()}
-    half_way = 0.5 * (lines["upper"][:, 1] + lines["lower"][:, 1])
+    lines = {name: edge_line(head, edge, sides[name], span).points for name, edge in LIPS.items()}
     level = np.full(span.size, 0.5 * (p["2.4"][1] + p["2.5"][1]))
-    gap = lines["upper"][:, 1] - lines["lower"][:, 1]
-    if motion is not None:
-        level = half_way
-    elif soft:
+    if soft:
+        half_way = 0.5 * (lines["upper"][:, 1] + lines["lower"][:, 1])
         level = half_way + smoothstep((1.0 - np.abs(span) / span[-1]) / CORNER) * (level - half_way)
     offsets = np.zeros_like(skin)
     for name, edge in LIPS.items():
         side, line = sides[name], lines[name]
         shift = level + edge.sign * 0.5 * LIP_GAP * fapu.mns0 - line[:, 1]
-        if not gaps:
-            shift = np.where(gap < LIP_GAP * fapu.mns0, shift, 0.0)
         x = skin[side, 0]
         place = np.column_stack([np.clip(x, span[0], span[-1]) if soft else x, *_along(x, span, line)])
         away = np.linalg.norm(skin[side] - place, axis=1) / (LIP_REACH * fapu.es0)
