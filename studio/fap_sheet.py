@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from PIL import Image
@@ -14,6 +14,7 @@ from fba.amplitudes import amplitudes
 from fba.arrays import Floats
 from fba.faps import fap
 from fba.high_level import BLEND_MAX, EXPRESSIONS, VISEMES
+from fba.scene import FaceScene, Node, Role, Transform
 from studio.render import Figure, Renderer, make_renderer
 from studio.render.camera import Camera
 from studio.sheet import MARGIN, PAPER, PosePick, Sheet, UInt8
@@ -34,6 +35,7 @@ JAW = ("9.15", "2.1", "8.3", "8.4")
 LEFT_EYE, RIGHT_EYE = ("3.7", "3.11", "3.1", "3.3"), ("3.8", "3.12", "3.2", "3.4")
 LEFT_BROW, RIGHT_BROW = ("4.5", "4.2", "3.3"), ("4.6", "4.1", "3.4")
 LEFT_CHEEK, RIGHT_CHEEK = ("5.1", "3.3", "8.3", "9.3"), ("5.2", "3.4", "8.4", "9.3")
+TONGUE = ("6.1", "6.2", "6.3", "6.4")
 NOSE = ("9.1", "9.2", "9.3", "9.15")
 LEFT_EAR, RIGHT_EAR = ("10.1", "10.5", "10.3", "10.7"), ("10.2", "10.6", "10.4", "10.8")
 FACE = ("4.5", "4.6", "2.1")
@@ -50,6 +52,7 @@ class View:
     margin : around them, in eye separations.
     yaw, pitch : degrees; see `Camera`.
     words : what a caption says about it.
+    roles : draw the shapes of these roles alone; empty for all.
     """
 
     points: tuple[str, ...] = WHOLE
@@ -57,6 +60,7 @@ class View:
     yaw: float = 0.0
     pitch: float = 0.0
     words: str = ""
+    roles: tuple[Role, ...] = ()
 
     def camera(self, places: Mapping[str, Floats], whole: Camera, es0: float) -> Camera:
         """The camera for a face; the whole head where it lacks one of the points."""
@@ -118,8 +122,11 @@ SECTIONS: tuple[Section, ...] = (
         "tongue",
         f"Tongue, the mouth opened by open_jaw {OPEN_MOUTH}",
         View(MOUTH, 0.24),
-        (43, 44, 46, 47, 45),
-        _each((45,), View(MOUTH, 0.24, SIDE, words="side")),
+        (43, 44, 47, 45, 46),
+        {
+            45: View(MOUTH, 0.24, SIDE, words="side"),
+            46: View(TONGUE, 0.28, SIDE, 15.0, "inside", (Role.TONGUE, Role.LOWER_TEETH)),
+        },
         opened=True,
     ),
     Section(
@@ -192,6 +199,7 @@ class _Artist:
         self.face = face
         self.player = Player(face)
         self.figure = Figure.of_face(face)
+        self.figures: dict[tuple[Role, ...], Figure] = {(): self.figure}
         self.renderer = renderer
         self.places = face.feature_points.positions(face.scene)
         self.keys = {t.key for t in face.tables}
@@ -237,11 +245,31 @@ class _Artist:
     def _draw(self, pick: PosePick, view: View) -> UInt8:
         pose = self.player.pose(pick.faps, pick.viseme, pick.expression)
         camera = view.camera(self.places, self.figure.camera, self.face.fapu.es0)
-        return self.figure.draw(pose.world_shapes(), CELL, camera, self.renderer)
+        return self._figure(view.roles).draw(pose.world_shapes(), CELL, camera, self.renderer)
+
+    def _figure(self, roles: tuple[Role, ...]) -> Figure:
+        if roles not in self.figures:
+            self.figures[roles] = Figure(_only(self.face.scene, roles))
+        return self.figures[roles]
 
     def _open_mouth(self) -> dict[int, float]:
         strict = self.face.notes.get("open_jaw") == "strict"
         return {3: OPEN_MOUTH, **(dict.fromkeys(LOWER_LIP, -OPEN_MOUTH) if strict else {})}
+
+
+def _only(scene: FaceScene, roles: tuple[Role, ...]) -> FaceScene:
+    """The scene with the shapes of these roles alone."""
+
+    def kept(nodes: tuple[Node, ...]) -> tuple[Node, ...]:
+        found: list[Node] = []
+        for node in nodes:
+            if isinstance(node, Transform):
+                found.append(replace(node, children=kept(node.children)))
+            elif node.role in roles:
+                found.append(node)
+        return tuple(found)
+
+    return replace(scene, roots=kept(scene.roots))
 
 
 def _sheet(title: str, pictures: list[UInt8], captions: list[str]) -> Sheet:

@@ -10,8 +10,9 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from fat import AnimatableFace, FaceDefTables
-from fba.faps import LOW_LEVEL_FAPS
+from fat import AnimatableFace, FaceDefTables, FaceMotion
+from fat.build import build_tables
+from fba.faps import LOW_LEVEL_FAPS, fap
 from fba.feature_points import FeaturePoints
 from formats import read_face
 from studio.cli.app import app
@@ -85,6 +86,18 @@ def test_without_feature_points_the_whole_head_is_shown(face: AnimatableFace) ->
     bare = replace(only(face, (19, 1)), feature_points=FeaturePoints({}))
     (sheet,) = fap_sheets(bare, make_renderer("software"))
     assert sheet.name == "eyes"
+
+
+def test_some_shapes_can_be_drawn_alone(face: AnimatableFace) -> None:
+    (number,) = [k for s in SECTIONS for k, view in s.views.items() if view.roles]
+    offsets = np.tile([0.0, 0.1 * face.fapu.es0, 0.0], (face.scene.shape("tongue").mesh.vertex_count, 1))
+    motion = FaceMotion(fap(number).name, number, 1, 400, {"tongue": offsets})
+    playing = replace(face, tables=build_tables(face.scene, face.fapu, [motion]))
+    (sheet,) = fap_sheets(playing, make_renderer("software"))
+    neutral, raised, _ = cells(sheet.image)
+    assert np.abs(raised - neutral).max() > 30
+    # Without the skin most of the picture is background: the same left and right of the tongue.
+    assert (np.abs(neutral - raised).max(axis=2) == 0).mean() > 0.3
 
 
 def test_check_draws_the_sheet(tmp_path: Path, face: AnimatableFace) -> None:
