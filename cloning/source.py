@@ -42,7 +42,7 @@ def source_motions(source: AnimatableFace, faps: frozenset[int] | None = None) -
     motions = face_motions(source, still)
     played = [t for t in wanted if t.key not in still]
     if played:
-        player = Player(source)
+        player = Player(source, rules=())
         rest = {s.name: source.scene.world_vertices(s.name) for s in source.scene.shapes}
         for table in played:
             borders = {int(b) for m in table.meshes for b in m.interval_borders} - {0}

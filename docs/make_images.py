@@ -1,8 +1,9 @@
-"""Draw the pictures of the documentation: ``python docs/make_images.py [hero|faps]...``, everything by default."""
+"""Draw the pictures of the documentation: ``python docs/make_images.py [NAME]...``, everything by default."""
 
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cloning import clone
@@ -26,6 +27,32 @@ POSES = (
     PosePick("viseme ou", viseme=(14, 0, BLEND_MAX)),
     PosePick("eyes and head", faps={23: 30000, 24: 30000, 49: 25000, 50: -8000}),
     PosePick("wink", faps={19: 620, 21: 400, 12: 300, 59: 300}),
+)
+
+
+@dataclass(frozen=True)
+class Combination:
+    """FAPs that fight, and the feature points in the middle of their picture."""
+
+    name: str
+    faps: dict[int, float]
+    around: tuple[str, ...]
+    zoom: float = 0.3
+
+
+LIPS = (4, 5, 8, 9, 10, 11, 51, 52, 55, 56, 57, 58)
+CORNERS = (6, 7, 53, 54)
+MOUTH = ("8.1", "8.2")
+COMBINATIONS = (
+    Combination("smile, both corner pairs", dict.fromkeys(CORNERS, 200) | dict.fromkeys((12, 13, 59, 60), 300), MOUTH),
+    Combination("lips pressed, 300 each", dict.fromkeys(LIPS, 300), MOUTH),
+    Combination("both lids closed", {19: 1024, 20: 1024, 21: 500, 22: 500}, ("3.5", "3.6")),
+    Combination("brows raised and squeezed", dict.fromkeys(range(31, 39), 300), ("4.1", "4.2")),
+    Combination(
+        "open_jaw 800, corners 150, lips -400",
+        {3: 800} | dict.fromkeys(CORNERS, 150) | dict.fromkeys(LIPS, -400) | dict.fromkeys(range(31, 37), 300),
+        MOUTH,
+    ),
 )
 
 
@@ -56,10 +83,33 @@ def faps() -> None:
         save_png(sheet.image, FOLDER / f"faps_{sheet.name}.png")
 
 
+def combining() -> None:
+    """FAPs that fight, by the plain sum and by the rules: docs/combining.md."""
+    face = read_face("default")
+    figure, renderer = Figure.of_face(face), make_renderer("software")
+    places = face.feature_points.positions(face.scene)
+    sheet = Sheet()
+    for index, combination in enumerate(COMBINATIONS):
+        middle = sum(places[key] for key in combination.around) / len(combination.around)
+        near = replace(
+            figure.camera,
+            target=tuple(float(c) for c in middle),
+            half_height=combination.zoom * figure.camera.half_height,
+            half_width=combination.zoom * figure.camera.half_width,
+        )
+        pictures = []
+        for rules in ((), None):
+            world = Player(face, rules=rules).pose(combination.faps).world_shapes()
+            pictures += [figure.draw(world, (260, 220), near.turned(yaw), renderer) for yaw in (0.0, 40.0)]
+        captions = ("plain sum", "", "by the rules", "") if index == len(COMBINATIONS) - 1 else ()
+        sheet.add_row(combination.name, pictures, captions)
+    sheet.save(FOLDER / "combining.png")
+
+
 def main(*wanted: str) -> None:
     """Draw these pictures; all without names."""
     FOLDER.mkdir(exist_ok=True)
-    pictures = {"hero": hero, "faps": faps}
+    pictures = {"hero": hero, "faps": faps, "combining": combining}
     for name in wanted or pictures:
         pictures[name]()
 

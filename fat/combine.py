@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fat.face import AnimatableFace
-from fat.response import Probe, Response
+from fat.response import Probe, Response, points_on_surface
 from fba.arrays import Floats, Ints
 from fba.errors import FapStreamError
 from fba.faps import fap
@@ -109,7 +109,7 @@ class Combination:
         ]
         self._rounding = ROUNDING * face.fapu.es0
         self._response = Response(face, [_closing(pair) for _, pair in meeting])
-        places = face.feature_points.positions(face.scene)
+        places = points_on_surface(face).positions(face.scene)
         self._rims = []
         for number, (rule, pair) in enumerate(meeting):
             apart = -sum(float(places[key] @ direction) for key, direction in _closing(pair).items())
@@ -205,14 +205,12 @@ def _columns(face: AnimatableFace) -> dict[int, int]:
     """FAP -> its column, for FAPs in rules that move vertices and whose feature point is on a surface."""
     pairs = (*CORNER_PAIRS, *CONTOUR_PAIRS, *(pair for found in MEETING_PAIRS.values() for pair in found))
     members = {number for pair in pairs for number in pair}
-    shapes = {s.name for s in face.scene.shapes}
-    found = {}
-    for column, table in enumerate(face.tables):
-        if table.fap_id in members and table.meshes:
-            point = face.feature_points.get(fap(table.fap_id).feature_points[0])
-            if point is not None and point.shape in shapes:
-                found[table.fap_id] = column
-    return found
+    points = points_on_surface(face)
+    return {
+        table.fap_id: column
+        for column, table in enumerate(face.tables)
+        if table.fap_id in members and table.meshes and fap(table.fap_id).feature_points[0] in points
+    }
 
 
 def _own(number: int) -> Probe:

@@ -10,6 +10,7 @@ from fat.face import AnimatableFace
 from fat.intervals import IntervalRule, interval_rule
 from fba.arrays import Bools, Floats, Ints
 from fba.faps import fap
+from fba.feature_points import FeaturePoints
 
 Probe = Mapping[str, tuple[float, float, float]]
 """Feature point -> direction (3,): a probe measures the sum of the points' motions along these directions."""
@@ -76,16 +77,29 @@ class Response:
         return moved
 
 
+def points_on_surface(face: AnimatableFace) -> FeaturePoints:
+    """The feature points that name vertices of the scene; free points and those of another mesh are left out."""
+    counts = {s.name: s.mesh.vertex_count for s in face.scene.shapes}
+    return FeaturePoints(
+        {
+            key: point
+            for key, point in face.feature_points.items()
+            if point.shape is not None and all(0 <= v < counts.get(point.shape, 0) for v in point.vertices)
+        }
+    )
+
+
 def _effects(face: AnimatableFace, probes: Sequence[Probe]) -> dict[str, Floats]:
     """Shape -> (n, 3, P): how much each probe grows when a vertex moves by one unit of its local axes."""
     counts = {s.name: s.mesh.vertex_count for s in face.scene.shapes}
+    points = points_on_surface(face)
     found: dict[str, Floats] = {}
     for number, probe in enumerate(probes):
         for key, direction in probe.items():
-            point = face.feature_points.get(key)
-            if point is None or point.shape is None or point.shape not in counts:
+            if key not in points:
                 continue
-            local = np.asarray(direction) @ face.scene.world_matrix(point.shape)[:3, :3]
-            effect = found.setdefault(point.shape, np.zeros((counts[point.shape], 3, len(probes))))
-            np.add.at(effect[:, :, number], list(point.vertices), np.outer(point.weights, local))
+            name = str(points[key].shape)
+            local = np.asarray(direction) @ face.scene.world_matrix(name)[:3, :3]
+            effect = found.setdefault(name, np.zeros((counts[name], 3, len(probes))))
+            np.add.at(effect[:, :, number], list(points[key].vertices), np.outer(points[key].weights, local))
     return found

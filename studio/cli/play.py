@@ -22,7 +22,7 @@ def play(
     rules: Annotated[
         str,
         typer.Option(
-            help="How FAPs that fight are combined: all, none (the plain sum), or some of corners,contours,brows,lids,lips."
+            help="Combine FAPs that fight by: all, none (plain sum), or some of corners,contours,brows,lids,lips."
         ),
     ] = "all",
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -251,6 +252,14 @@ def test_a_fap_alone_and_neutral_are_bit_identical() -> None:
         values[row, column] = value
     np.testing.assert_array_equal(combination(values), values)
     np.testing.assert_array_equal(Player(face).pose().world(), face.scene.world_neutral())
+
+
+def test_feature_points_of_another_mesh_have_no_rules() -> None:
+    face = small_face()
+    foreign = FeaturePoints({k: FeaturePoint("skin", (999,), (1.0,)) for k in ("2.2", "8.3", "3.1", "4.1")})
+    other = replace(face, feature_points=foreign)
+    values = {6: 300, 53: 300, 19: 1024, 21: 500}
+    np.testing.assert_array_equal(Player(other).pose(values).world(), Player(face, rules=()).pose(values).world())
 
 
 def test_the_given_values_are_not_written_to() -> None:
