@@ -133,6 +133,20 @@ RECIPES: dict[int, Recipe] = {
             carried=(*LOWER_LIP, *LIP_CORNERS, "2.1", "2.10"),
             whole=True,
         ),
+        Recipe(
+            16,
+            (
+                Border(-300, ({"mouthRollLower": 1.0},), MIDLIPS),
+                Border(500, ({"mouthPucker": 1.0}, {"mouthFunnel": 1.0}), MIDLIPS),
+            ),
+        ),
+        Recipe(
+            17,
+            (
+                Border(-400, ({"mouthRollUpper": 1.0},)),
+                Border(500, ({"mouthFunnel": 1.0}, {"mouthPucker": 1.0}), MIDLIPS),
+            ),
+        ),
         *_contours(),
         *_sided(0, "Left"),
         *_sided(1, "Right"),
