@@ -15,13 +15,18 @@ from fba.faps import fap
 from fba.fapu import Fapu
 
 UNSEEN = 0.005
-"""Part of a table's largest offset by which a vertex may miss its place at a border that is left out."""
+"""Part of a table's largest offset by which a vertex may miss its place at a border that is left out ..."""
+
+SMALL = 5e-4
+"""... or, where that is more, this: three hundredths of a millimetre, in eye separations."""
 
 ROUNDING = 1e-7
 """Largest error of rounding at the last border, in eye separations."""
 
 
-def compact(tables: FaceDefTables, fapu: Fapu, unseen: float = UNSEEN, rounding: float = ROUNDING) -> FaceDefTables:
+def compact(
+    tables: FaceDefTables, fapu: Fapu, unseen: float = UNSEEN, small: float = SMALL, rounding: float = ROUNDING
+) -> FaceDefTables:
     """Leave out borders between which vertices go straight anyway, and digits that do not matter.
 
     Parameters
@@ -29,6 +34,7 @@ def compact(tables: FaceDefTables, fapu: Fapu, unseen: float = UNSEEN, rounding:
     tables : of a face with these FAP units.
     unseen : how far a vertex may be from its place at a border that is left out, as a part of the table's largest
         offset there. At the borders that are kept, always the outermost ones and 0, it is exact.
+    small : the same in eye separations; the larger of the two holds.
     rounding : largest error of the written numbers at the outermost border, in eye separations.
 
     Returns
@@ -42,7 +48,8 @@ def compact(tables: FaceDefTables, fapu: Fapu, unseen: float = UNSEEN, rounding:
         for mesh in table.meshes:
             for border, length in zip(mesh.interval_borders.tolist(), _lengths(_places(mesh)), strict=True):
                 largest[border] = max(largest.get(border, 0.0), float(length.max(initial=0.0)))
-        parts = (part for mesh in table.meshes for part in _thinned(mesh, unseen, largest))
+        limits = {border: max(unseen * length, small / unit) for border, length in largest.items()}
+        parts = (part for mesh in table.meshes for part in _thinned(mesh, limits))
         out.append(replace(table, meshes=tuple(_rounded(part, rounding / unit) for part in parts)))
     return FaceDefTables(tuple(out))
 
@@ -59,10 +66,10 @@ def _lengths(places: Floats) -> Floats:
     return lengths
 
 
-def _thinned(mesh: FaceDefMesh, unseen: float, largest: dict[int, float]) -> Iterator[FaceDefMesh]:
+def _thinned(mesh: FaceDefMesh, limits: dict[int, float]) -> Iterator[FaceDefMesh]:
     borders, places = mesh.interval_borders, _places(mesh)
     zero = int(np.searchsorted(borders, 0))
-    allowed = unseen * np.array([largest[b] for b in borders.tolist()])
+    allowed = np.array([limits[b] for b in borders.tolist()])
     few = np.unique([0, zero, borders.size - 1])
     straight = np.ones(len(mesh.coord_index), dtype=bool)
     sides = list(pairwise(few.tolist()))
