@@ -63,23 +63,14 @@ def read_decimals(text: str) -> Floats | None:
     negative = first == ord("-")
     begins = starts + (negative | (first == ord("+")))
     stops, exponents = _exponents(raw, starts, ends)
-    if exponents is None:
-        return None
     points, dotted = _points(raw, starts, stops)
     before, behind = points - begins, stops - points - dotted
-    if np.any(before < 0) or np.any(behind < 0) or np.any(before + behind < 1):
+    if exponents is None or np.any(before < 0) or np.any(behind < 0) or np.any(before + behind < 1):
         return None
-    windows = np.ndarray((raw.size - 7,), dtype="<u8", buffer=raw, strides=(1,))
-    parts = [
-        _digits(windows, points, before),
-        _digits(windows, stops, behind),
-        _digits(windows, stops - 8, behind - 8),
-    ]
+    mantissa, plain = _mantissas(raw, points, stops, before, behind)
     slow = (before > 8) | (behind > _LOOK_BACK) | (before + behind > 18)
-    if any(np.any(~plain & ~slow) for _, plain in parts):
+    if not np.all(plain | slow):
         return None
-    whole, low, high = (value for value, _ in parts)
-    mantissa = whole * _WHOLE_POWERS[np.minimum(behind, _LOOK_BACK)] + high * _WHOLE_POWERS[8] + low
     shift = exponents - behind
     slow |= (mantissa > np.uint64(2**53)) | (np.abs(shift) > _EXACT_POWER)
     if np.count_nonzero(slow) > _MOST_SLOW * slow.size:
@@ -97,6 +88,28 @@ def read_decimals(text: str) -> Floats | None:
     return values
 
 
+def _mantissas(
+    raw: NDArray[np.uint8], points: _Places, stops: _Places, before: _Places, behind: _Places
+) -> tuple[_Words, Bools]:
+    """Digits before and behind the point as one integer, and whether they all are digits."""
+    windows = _windows(raw)
+    whole, plain = _digits(windows, points, before)
+    low, low_plain = _digits(windows, stops, behind)
+    mantissa = whole * _WHOLE_POWERS[np.minimum(behind, _LOOK_BACK)] + low
+    plain &= low_plain
+    long = np.flatnonzero(behind > 8)
+    if long.size:
+        high, high_plain = _digits(windows, stops[long] - 8, behind[long] - 8)
+        mantissa[long] += high * _WHOLE_POWERS[8]
+        plain[long] &= high_plain
+    return mantissa, plain
+
+
+def _windows(raw: NDArray[np.uint8]) -> _Words:
+    """Eight characters from every place on, as one number with the first in its lowest byte."""
+    return np.ndarray((raw.size - 7,), dtype="<u8", buffer=raw, strides=(1,))
+
+
 def _exponents(raw: NDArray[np.uint8], starts: _Places, ends: _Places) -> tuple[_Places, _Places | None]:
     """Where the mantissa of each word ends, and its power of ten; None where what follows an e is no integer."""
     stops, exponents = ends.copy(), np.zeros(len(starts), dtype=np.int64)
@@ -108,8 +121,7 @@ def _exponents(raw: NDArray[np.uint8], starts: _Places, ends: _Places) -> tuple[
     sign = raw[marks + 1]
     negative = sign == ord("-")
     count = ends[owners] - marks - 1 - (negative | (sign == ord("+")))
-    windows = np.ndarray((raw.size - 7,), dtype="<u8", buffer=raw, strides=(1,))
-    value, plain = _digits(windows, ends[owners], count)
+    value, plain = _digits(_windows(raw), ends[owners], count)
     if np.any(count < 1) or np.any(count > 8) or not plain.all():
         return stops, None
     exponents[owners] = np.where(negative, -value.astype(np.int64), value.astype(np.int64))
