@@ -21,17 +21,19 @@ from authoring.names import unit_name
 from benchmarks.fidelity import SHARED, read_kit_points
 from fat.profiles import ARKIT, profile_table
 from fba.arrays import Floats
-from fba.scene import Role
+from fba.feature_points import FeaturePoints
+from fba.scene import FaceScene, Role
 from fba.shapes import ShapeSet
 from formats import read_scene
+from formats.landmarks import read_landmarks
+from formats.shapes import read_shapes
 from samples.build.arkit_anatomy import mirror_shape
 from samples.build.arkit_docs import put_tables
 from samples.build.arkit_fit import Residual, residual, shape_to_faps
 from samples.build.arkit_table import DATA, DOCS, FORWARD, read_rows, tables_in_words, write_rows
-from samples.build.known_shapes import KnownShapes
+from samples.build.known_shapes import STILL, KnownShapes
 
-FACES = {"ict": ("ict-facekit", "generic_neutral_mesh.obj"), "rpm": ("rpm-brunette", "neutral.obj")}
-"""Name -> folder and neutral face; landmarks lie in landmarks/NAME.json."""
+RPM_POINTS = Path(__file__).resolve().parents[1] / "tests" / "data" / "rpm_brunette.fps.json"
 
 
 def main() -> None:
@@ -52,24 +54,33 @@ def main() -> None:
 
 
 def known_faces(faces: Path) -> Iterator[KnownShapes]:
-    """Faces with shapes of ARKit, where the folder and feature points are there."""
-    for name, (folder, neutral) in FACES.items():
-        landmarks = faces / "landmarks" / f"{name}.json"
-        if not landmarks.exists():
-            continue
-        scene = read_scene(faces / "faces" / folder / neutral)
-        stored = np.load(faces / "faces" / folder / "expressions.npz")
-        base = scene.frame.to_file(scene.world_neutral())
-        shapes = ShapeSet(tuple(map(str, stored["names"])), base, stored["deltas"].astype(np.float64))
-        face, _ = author(scene, read_kit_points(landmarks, scene), shapes)
-        found = KnownShapes(name, face, arkit_shapes(shapes.names, face.scene.frame.from_file(shapes.deltas)))
-        yield replace(found, shapes={k: v for k, v in found.shapes.items() if not _lids_alone(found, k, v)})
+    """ICT-FaceKit and a Ready Player Me head with their own shapes, where their folders are there."""
+    kit = faces / "faces" / "ict-facekit"
+    if kit.is_dir():
+        scene = read_scene(kit / "generic_neutral_mesh.obj")
+        points = read_kit_points(faces / "landmarks" / "ict.json", scene)
+        yield known_face("ict", scene, points, read_shapes(kit / "expressions.npz", scene))
+    avatar = faces / "faces" / "rpm-brunette" / "brunette-t.glb"
+    if avatar.exists():
+        scene = read_scene(avatar)
+        yield known_face("rpm", scene, read_landmarks(RPM_POINTS, scene), read_shapes(avatar, scene))
 
 
-def _lids_alone(known: KnownShapes, name: str, offsets: Floats) -> bool:
-    """A gaze that leaves the turning of the eyeball to the program that plays it."""
-    balls = known.of_role(Role.EYE_LEFT, Role.EYE_RIGHT)
-    return name.startswith("eyeLook") and float(np.abs(offsets[balls]).max(initial=0.0)) < 1e-3 * known.face.fapu.es0
+def known_face(name: str, scene: FaceScene, points: FeaturePoints, shapes: ShapeSet) -> KnownShapes:
+    """A face animatable by its own shapes, and these shapes."""
+    face, _ = author(scene, points, shapes)
+    found = KnownShapes(name, face, arkit_shapes(shapes.names, face.scene.frame.from_file(shapes.deltas)))
+    return replace(found, shapes={k: v for k, v in found.shapes.items() if _whole(found, k, v)})
+
+
+def _whole(known: KnownShapes, name: str, offsets: Floats) -> bool:
+    """The shape moves what it is about: some kits leave the eyeballs' turn to the program, or have no tongue."""
+    part = known.seen
+    if name.startswith("eyeLook"):
+        part = known.of_role(Role.EYE_LEFT, Role.EYE_RIGHT)
+    elif name == "tongueOut":
+        part = known.of_role(Role.TONGUE)
+    return float(np.abs(offsets[part]).max(initial=0.0)) > STILL * known.face.fapu.es0
 
 
 def arkit_shapes(names: tuple[str, ...], deltas: Floats) -> dict[str, Floats]:

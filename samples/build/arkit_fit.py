@@ -51,7 +51,7 @@ class Residual:
     """What a combination leaves over.
 
     fp : sum of the errors / sum of the motion, over the feature points along the axes of all FAPs, and the eyeballs.
-    dense : ||D_shape - D_combination|| / ||D_shape|| over the visible skin (tongue, eyeballs where it stays still).
+    dense : ||D_shape - D_combination|| / ||D_shape|| over visible skin and eyeballs (the tongue where these are still).
     """
 
     fp: float

@@ -21,6 +21,7 @@ from fat.open_jaw import JAW
 from fat.profiles.names import ARKIT
 from fba.amplitudes import amplitudes
 from fba.arrays import Floats
+from fba.errors import MeshError
 from fba.faps import fap
 from formats import read_face
 from formats.files import write_bytes
@@ -45,9 +46,9 @@ FORWARD = f"""\
 # faps: FAP:value, in FAP units (ISO/IEC 14496-2; angles in 1e-5 rad); shown together and added, they come nearest to
 # the shape at weight 1. Fitted to MakeHuman's face units (CC0; faceunits01 in {WHEEL})
 # with the tables of the shipped source: bounded least squares over feature points and visible skin, both sides alike.
-# strict_faps: the same where open_jaw leaves the lips, as the standard has it; a practical one takes the lower lip along.
+# strict_faps: the same where open_jaw leaves the lips, as in the standard; a practical one takes the lower lip along.
 # makehuman_fp: sum of errors / sum of motion over the feature points along the axes of all FAPs.
-# makehuman_dense: |shape - combination| / |shape| over the visible skin (tongue, eyeballs where the skin stays still).
+# makehuman_dense: |shape - combination| / |shape| over visible skin and eyeballs (the tongue where these stay still).
 """
 BACKWARD = f"""\
 # FAPs as shapes of ARKit, one row for each direction, made by `{COMMAND}`: do not edit by hand.
@@ -85,14 +86,22 @@ def main() -> None:
 
 
 def makehuman_shapes(makehuman: MakeHuman, face: AnimatableFace) -> KnownShapes:
-    """The source with MakeHuman's face units on the same head."""
+    """The source with MakeHuman's face units on the same head.
+
+    Raises
+    ------
+    MeshError
+        If the source was built from another head.
+    """
     head = source_head(makehuman)
     scene = face.scene
+    if any(scene.shape(name).mesh.vertex_count != len(part) for name, part in head.parts.items()):
+        raise MeshError("the shipped source is not made of this head; rebuild it first: python -m samples.build")
     still = {shape.name: np.zeros((shape.mesh.vertex_count, 3)) for shape in scene.shapes}
     shapes: dict[str, Floats] = {}
     for name in ARKIT:
         offsets = head.unit(name)
-        target = makehuman.target("faceunits", name)
+        target = head.makehuman.target("faceunits", name)
         for shape, _, group, _ in EYES:
             ids = np.unique(makehuman.base.quads[makehuman.base.groups[group]])
             turn = fit_similarity(head.body[ids], head.body[ids] + target[ids])[1]

@@ -70,11 +70,10 @@ class KnownShapes:
         return mask
 
     def judged(self, offsets: Floats) -> Bools:
-        """(N,) vertices on which a motion is compared: visible skin; tongue or eyeballs where that stays still."""
-        for mask in (self.seen, self.of_role(Role.TONGUE), self.of_role(Role.EYE_LEFT, Role.EYE_RIGHT)):
-            if np.abs(offsets[mask]).max(initial=0.0) > STILL * self.face.fapu.es0:
-                return mask
-        return self.seen
+        """(N,) vertices on which a motion is compared: visible skin and eyeballs; the tongue where these stay still."""
+        outside = self.seen | self.of_role(Role.EYE_LEFT, Role.EYE_RIGHT)
+        still = float(np.abs(offsets[outside]).max(initial=0.0)) < STILL * self.face.fapu.es0
+        return self.of_role(Role.TONGUE) if still else outside
 
     def motion(self, faps: Mapping[int, float]) -> Floats:
         """(N, 3) offsets of the face's own tables at FAP values; FAPs without a table do nothing."""
@@ -122,5 +121,5 @@ TURNS = tuple(k for _, *numbers in EYES for k in numbers)
 COMPARED = (*TURNS, *(f.id for f in faps() if f.direction is not None and f.id not in (27, 28)))
 """FAPs that motions are compared by: where an eyeball goes is read off its turn."""
 
-STILL = 0.02
-"""Eye separations that a part has to move to be seen moving."""
+STILL = 1e-3
+"""Eye separations below which nothing is seen moving."""

@@ -88,8 +88,9 @@ def test_only_what_is_seen_is_judged(known: KnownShapes) -> None:
     assert not known.seen[teeth].any()
     front = int(np.argmax(np.where(skin, known.neutral[:, 2], -np.inf)))
     assert known.seen[front], "the tip of the nose"
-    gaze = known.shapes["eyeLookOutLeft"]
-    assert np.array_equal(known.judged(gaze), known.of_role(Role.EYE_LEFT, Role.EYE_RIGHT))
+    eyes, tongue = known.of_role(Role.EYE_LEFT, Role.EYE_RIGHT), known.of_role(Role.TONGUE)
+    assert np.array_equal(known.judged(known.shapes["jawOpen"]), known.seen | eyes)
+    assert np.array_equal(known.judged(np.where(tongue[:, None], known.face.fapu.es0, 0.0)), tongue)
 
 
 def test_every_shape_has_its_muscles() -> None:
