@@ -180,7 +180,7 @@ class Tongue:
         return self._curled(asked)
 
     def _curled(self, angle: float) -> Floats:
-        """Each half bent up into a U: an arc from the middle curve to VALLEY, whose end turns by angle, then straight."""
+        """Each half bent up into a U: an arc about the middle curve, then straight at this angle."""
         left, right = (self.surface.positions[k] for k in BORDERS)
         bottom = self._curve() + 0.5 * (left + right) - self.middle
         local = self.surface.vertices - bottom
