@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from authoring import jaw, lids
 from authoring.construct import construct
 from authoring.construction import Offsets
+from authoring.ends import unfolded
 from authoring.from_units import UnitMaker, UnitMotion
 from authoring.recipes import RECIPES, UNITS_FIRST
 from authoring.report import How, Step
@@ -59,9 +60,11 @@ class LowLevel:
         why: list[str] = []
         findings: list[Finding] = []
         self._given(entry, found, why, findings)
+        made: dict[int, tuple[Offsets, Step]] = {}
         for sign in (-1, 1) if entry.bidirectional else (1,):
             if not any(value * sign > 0 for value in found):
-                self._side(entry, sign, found, why)
+                self._side(entry, sign, made, why)
+        found.update(self._unfolded(fap_id, made, why))
         rows = sorted(found.items())
         still = self.shapes.without_resting
         motions = tuple(FaceMotion(entry.name, fap_id, 1, value, still(offsets)) for value, (offsets, _) in rows)
@@ -78,6 +81,22 @@ class LowLevel:
             else:
                 found.update(made)
                 return
+
+    def _unfolded(
+        self, fap_id: int, made: dict[int, tuple[Offsets, Step]], why: list[str]
+    ) -> dict[int, tuple[Offsets, Step]]:
+        """What was made, up to where the skin folds."""
+        kept = unfolded(self.face, fap_id, {value: offsets for value, (offsets, _) in made.items()})
+        out = {}
+        for value, offsets in kept.items():
+            beyond = min((v for v in made if v * value > 0 and abs(v) >= abs(value)), key=abs)
+            step = made[beyond][1]
+            if beyond != value:
+                parts = {name: value / beyond * factor for name, factor in step.parts.items()}
+                step = Step(value, step.how, parts)
+                why.append(f"the table ends at {value}, beyond which the skin folds")
+            out[value] = (offsets, step)
+        return out
 
     def _given(
         self, entry: Fap, found: dict[int, tuple[Offsets, Step]], why: list[str], findings: list[Finding]

@@ -56,7 +56,6 @@ TIED_FAPS = (6, 7, 12, 13, 53, 54, 59, 60)
 UPPER_LIP = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
 LOWER_LIP = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
 LIP_CORNERS = ("2.4", "2.5", "8.3", "8.4")
-LIDS = ("3.1", "3.2", "3.3", "3.4")
 JAW = (*LOWER_LIP, *LIP_CORNERS, "2.1", "2.10", "5.1", "5.2")
 MIDLIPS = ("2.2", "2.3")
 BROWS = ("4.1", "4.2", "4.3", "4.4", "4.5", "4.6")
@@ -110,14 +109,11 @@ def _sided(k: int, side: str) -> list[Recipe]:
         Recipe(
             19 + k, (Border(-350, ({f"eyeWide{side}": 1.0},)), Border(1024, ({f"eyeBlink{side}": 1.0},))), carried=LIDS
         ),
-        Recipe(21 + k, (Border(512, ({f"eyeSquint{side}": 1.0},)),), carried=LIDS),
-        *(
-            Recipe(f, (Border(-100, down, BROWS), Border(value, mixes, BROWS)), carried=LIDS)
-            for f, value, mixes in brow
-        ),
-        Recipe(37 + k, (Border(100, down, BROWS, axes="xz"),), carried=LIDS),
+        Recipe(21 + k, (Border(512, ({f"eyeSquint{side}": 1.0},)),)),
+        *(Recipe(f, (Border(-100, down, BROWS), Border(value, mixes, BROWS))) for f, value, mixes in brow),
+        Recipe(37 + k, (Border(100, down, BROWS, axes="xz"),)),
         Recipe(39 + k, (Border(250, ({f"cheekPuff{side}": 1.0},)),)),
-        Recipe(41 + k, (Border(140, ({f"cheekSquint{side}": 1.0}, {f"cheekRaiser{side}": 1.0})),), carried=LIDS),
+        Recipe(41 + k, (Border(140, ({f"cheekSquint{side}": 1.0}, {f"cheekRaiser{side}": 1.0})),)),
         Recipe(61 + k, (Border(150, ({f"noseWide{side}": 1.0},)),)),
     ]
 
