@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -55,13 +55,14 @@ def profile_shapes(
     strict = open_jaw_mode(face) == "strict"
     neutral = face.scene.world_neutral()
     names, deltas = [], []
-    findings: list[Finding] = []
+    partial: dict[str, list[_Key]] = {}
+    gone: dict[str, list[_Key]] = {}
     for row in profile_table(profile):
         shape = replace(row, faps=row.strict_faps) if strict and row.strict_faps else row
         wanted = _keys(shape)
         missing = [key for key in wanted if face.tables.get(*key) is None]
         if missing:
-            findings.append(_incomplete(shape, missing, len(missing) == len(wanted)))
+            (gone if len(missing) == len(wanted) else partial)[shape.name] = missing
         if shape.still or len(missing) < len(wanted):
             names.append(shape.name)
             deltas.append(to_file_order(face.scene, _world(player, shape) - neutral))
@@ -74,7 +75,8 @@ def profile_shapes(
             f"the tables of '{face.scene.name}' move none of the shapes of the profile '{profile}'; "
             "`fba inspect` lists the FAPs that they have"
         )
-    return ShapeSet(tuple(names), to_file_order(face.scene, neutral), np.stack(deltas)), findings
+    shapes = ShapeSet(tuple(names), to_file_order(face.scene, neutral), np.stack(deltas))
+    return shapes, _incomplete(gone, partial, face.scene.name)
 
 
 def _world(player: Player, shape: ProfileShape) -> Floats:
@@ -94,14 +96,21 @@ def _keys(shape: ProfileShape) -> list[_Key]:
     return keys
 
 
-def _incomplete(shape: ProfileShape, missing: Iterable[_Key], whole: bool) -> Finding:
-    listed = ", ".join(_named(key) for key in missing)
-    if whole:
-        text = f"the shape is left out: the face has no table for {listed}"
-        return Finding("warning", "profile-shape-missing", text, shape.name)
-    text = f"the shape lacks a part: the face has no table for {listed}"
-    return Finding("warning", "profile-shape-partial", text, shape.name)
+def _incomplete(gone: Mapping[str, Sequence[_Key]], partial: Mapping[str, Sequence[_Key]], where: str) -> list[Finding]:
+    """Which shapes lack what."""
+    findings = []
+    if gone:
+        text = f"shapes that are left out, as the face has no table for any part of them: {_listed(gone)}"
+        findings.append(Finding("warning", "profile-shapes-missing", text, where))
+    if partial:
+        text = f"shapes that lack a part for which the face has no table: {_listed(partial)}"
+        findings.append(Finding("warning", "profile-shapes-partial", text, where))
+    return findings
+
+
+def _listed(shapes: Mapping[str, Sequence[_Key]]) -> str:
+    return ", ".join(f"{name} ({', '.join(map(_named, keys))})" for name, keys in shapes.items())
 
 
 def _named(key: _Key) -> str:
-    return table_name(*key) if key[0] <= EXPRESSION_FAP else f"FAP {key[0]} {table_name(*key)}"
+    return table_name(*key) if key[0] <= EXPRESSION_FAP else f"FAP {key[0]}"
