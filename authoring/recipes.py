@@ -106,9 +106,7 @@ def _sided(k: int, side: str) -> list[Recipe]:
         Recipe(53 + k, stretched, (inner,), judged=inner),
         Recipe(12 + k, raised, (outer,)),
         Recipe(59 + k, raised, (inner,), judged=inner),
-        Recipe(
-            19 + k, (Border(-350, ({f"eyeWide{side}": 1.0},)), Border(1024, ({f"eyeBlink{side}": 1.0},))), carried=LIDS
-        ),
+        Recipe(19 + k, (Border(-350, ({f"eyeWide{side}": 1.0},)), Border(1024, ({f"eyeBlink{side}": 1.0},)))),
         Recipe(21 + k, (Border(512, ({f"eyeSquint{side}": 1.0},)),)),
         *(Recipe(f, (Border(-100, down, BROWS), Border(value, mixes, BROWS))) for f, value, mixes in brow),
         Recipe(37 + k, (Border(100, down, BROWS, axes="xz"),)),
