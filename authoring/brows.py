@@ -10,17 +10,13 @@ from authoring.construction import Construction
 from authoring.curves import brow_places, rim_places
 from cloning.prepare import PreparedFace
 
-BORDERS = (-900, -600, -300, 300, 600, 900)
+BORDERS = (-900, -300, 300, 900)
 
 REACH = 2.4
 """In eye widths: from the brow to the top of the forehead, which gives way to a brow that is raised."""
 
 _EYES = (("3.7", "3.11"), ("3.8", "3.12"))
 _MIDDLES = ("4.3", "4.4")
-
-
-def _lids(face: PreparedFace, _: Mapping[str, float]) -> list[Place]:
-    return rim_places(face)
 
 
 def _brow(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
@@ -30,7 +26,7 @@ def _brow(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
 _MOTIONS = (
     *(BumpMotion(k, BORDERS, _EYES[(k + 1) % 2], REACH, slides=True, carries=True, shape=_brow) for k in range(31, 37)),
     *(
-        BumpMotion(k, BORDERS, _EYES[(k + 1) % 2], REACH, pins=_MIDDLES, slides=True, carries=True, shape=_lids)
+        BumpMotion(k, BORDERS, _EYES[(k + 1) % 2], REACH, pins=_MIDDLES, slides=True, carries=True, shape=_brow)
         for k in (37, 38)
     ),
 )

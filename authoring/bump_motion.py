@@ -46,8 +46,7 @@ class BumpMotion:
     tied : feature points that move along with the FAP's own.
     pins : feature points that stay still besides those that other FAPs move along the same axis.
     slides : True if the skin follows the round of the head.
-    bulges : True if positive values take the skin along its normal at the feature point, as far as the FAP says along
-        its axis; negative ones go along the axis alone, because teeth lie behind.
+    bulges : True if the skin goes along its normal at the feature point, as far as the FAP says along its axis.
     carries : True if hidden skin behind the moving one, such as the mouth's lining, goes along.
     shape : (face, feature point -> weight) -> more places with weights, to give the bump its outline.
     """
@@ -83,13 +82,13 @@ class BumpMotion:
     def _fields(self, face: PreparedFace) -> Iterator[tuple[int, Floats]]:
         """(border, field (n, 3) in eye separations), from 0 outwards on both sides."""
         rest = face.skin.vertices
-        bump = self._bump(face, self._way(face, 1))
+        way = self._way(face)
+        bump = self._bump(face, way)
         entry = fap(self.fap_id)
         unit = face.fapu.unit(entry.unit) / face.fapu.es0
         at_rest = bump.weight(rest)
         ground = fit_round(face.skin, at_rest) if self.slides else None
         for sign in (1, -1):
-            way = self._way(face, sign)
             shift, field, reached = np.zeros_like(rest), np.zeros_like(rest), 0
             for border in sorted((b for b in self.borders if b * sign > 0), key=abs):
                 length = (border - reached) * unit
@@ -102,10 +101,10 @@ class BumpMotion:
                 done = bump.level(field) if ground else field
                 yield border, before_eyeballs(face, done)
 
-    def _way(self, face: PreparedFace, sign: int) -> Floats:
-        """(3,) where the skin goes as the value rises above or falls below 0; 1 along the FAP's axis."""
+    def _way(self, face: PreparedFace) -> Floats:
+        """(3,) where the skin goes; 1 along the FAP's axis."""
         direction = np.asarray(fap(self.fap_id).direction)
-        if not self.bulges or sign < 0:
+        if not self.bulges:
             return direction
         normal = (face.skin.point_matrix([self.own]) @ face.skin.normals)[0]
         normal /= max(float(np.linalg.norm(normal)), 1e-12)

@@ -14,7 +14,7 @@ import numpy as np
 from authoring.bumps import Place, bumps
 from cloning.prepare import PreparedFace
 from cloning.rims import eyes
-from fba.arrays import Floats
+from fba.arrays import Bools, Floats
 from fba.closest import TriangleSearch
 
 LIPS = (
@@ -28,6 +28,10 @@ BROWS = (("4.6", "4.4", "4.2"), ("4.1", "4.3", "4.5"))
 
 PARTS = (0.25, 0.5, 0.75)
 """Where places lie between two feature points."""
+
+CAP, CAP_HEIGHT, AROUND = 0.15, 0.94, 8
+"""Radius of a cap in eye separations, the weight at its edge, and the number of places there: the top of a ball of a
+radius of 0.45, about a cheek's."""
 
 RIM_STEP = 6
 """One place for so many slices of an eye: 8 a lid."""
@@ -52,6 +56,23 @@ def _blended(face: PreparedFace, curves: Sequence[Sequence[str]], values: Mappin
         known = [k for k in keys if k in face.skin.points]
         if len(known) > 2:
             found += _along(face, known, [values.get(k, 0.0) for k in known])
+    return found
+
+
+def cap_places(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
+    """Places all around feature points, on a round cap of the height of their weights: no bump ends in a cone there."""
+    found = []
+    for key, value in values.items():
+        middle = face.skin.positions[key]
+        normal = (face.skin.point_matrix([key]) @ face.skin.normals)[0]
+        normal /= max(float(np.linalg.norm(normal)), 1e-12)
+        up = np.array([0.0, 1.0, 0.0]) - normal[1] * normal
+        up /= max(float(np.linalg.norm(up)), 1e-12)
+        aside = np.cross(up, normal)
+        near = np.linalg.norm(face.skin.vertices - middle, axis=1) < 3.0 * CAP
+        angles = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+        spots = middle + CAP * (np.cos(angles)[:, None] * up + np.sin(angles)[:, None] * aside)
+        found += _nearest(face, near & bumps(face).side(key), spots, np.full(AROUND, value * CAP_HEIGHT))
     return found
 
 
@@ -88,15 +109,24 @@ def _along(face: PreparedFace, keys: Sequence[str], values: Sequence[float]) -> 
     line = PchipInterpolator(knots[:, 0], knots)
     side = maker.side(keys[len(keys) // 2])
     near = np.linalg.norm(surface.vertices[:, None] - knots[None], axis=2).min(axis=1) < 2.0 * np.ptp(knots[:, 0])
-    triangles = surface.triangles[(side & near)[surface.triangles].all(axis=1)]
+    spots, weights = [], []
+    for (a, b), (u, v) in zip(pairwise(knots), pairwise(values), strict=True):
+        for part in PARTS:
+            spots.append(line(a[0] + part * (b[0] - a[0])))
+            weights.append(u + (v - u) * part * part * (3.0 - 2.0 * part))
+    return _nearest(face, side & near, np.array(spots), np.array(weights))
+
+
+def _nearest(face: PreparedFace, where: Bools, spots: Floats, values: Floats) -> list[Place]:
+    """The places on a part of the skin that are nearest to spots (k, 3), with values (k,)."""
+    surface = face.skin
+    triangles = surface.triangles[where[surface.triangles].all(axis=1)]
     if not len(triangles):
         return []
     search = TriangleSearch(surface.vertices, triangles)
     found = []
-    for (a, b), (u, v) in zip(pairwise(knots), pairwise(values), strict=True):
-        for part in PARTS:
-            spot: Floats = line(a[0] + part * (b[0] - a[0]))
-            triangle, weights, away = search.closest(spot)
-            if away < OFF:
-                found.append(Place(triangles[triangle], weights, u + (v - u) * part * part * (3.0 - 2.0 * part)))
+    for spot, value in zip(spots, values.tolist(), strict=True):
+        triangle, weights, away = search.closest(spot)
+        if away < OFF:
+            found.append(Place(triangles[triangle], weights, value))
     return found
