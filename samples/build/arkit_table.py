@@ -58,7 +58,7 @@ BACKWARD = f"""\
 NOTES: Mapping[int, str] = {
     **dict.fromkeys((27, 28), "no shape of ARKit moves an eyeball out of its place"),
     **dict.fromkeys((29, 30), "no shape of ARKit changes the pupils"),
-    **dict.fromkeys((43, 46, 47), "ARKit's only tongue shape is tongueOut"),
+    **dict.fromkeys((43, 44, 46, 47), "ARKit's only tongue shape is tongueOut"),
     **dict.fromkeys((48, 49, 50), "ARKit has the head's turn as a transform beside the shapes"),
     64: "no shape of ARKit bends the nose",
     **dict.fromkeys((65, 66, 67, 68), "no shape of ARKit moves the ears"),
