@@ -85,6 +85,9 @@ SINKS = 0.6
 """A closed lid gives up this share of the distance by which its rim stands farther out than the other one, so that
 no slit opens between them from below."""
 
+GRAZED = 0.15
+"""Skin that a moving ball only grazes, with less than this share of its radius, is not pushed all its way."""
+
 FARTHEST = np.radians(70.0)
 """A lid turns by less than this."""
 
@@ -127,7 +130,7 @@ class Lid:
         skin = turned.copy()
         if value > 0:
             skin[self.eye.lids[self.part].vertices, 1] += self.eye.follow(self.part, skin, self._travel(value), ANY)
-        self._clear(skin)
+        keep_clear(self.face, self.ball, skin)
         riders = carried(face, skin - turned)
         shares = carried(face, np.repeat(share[:, None], 3, axis=1))
         for name, rest in riders.items():
@@ -203,18 +206,6 @@ class Lid:
         travel: Floats = value / FAPU_DIVISOR * (1.0 + beside * beyond)
         return travel
 
-    def _clear(self, skin: Floats) -> None:
-        """Push (n, 3) offsets forward where the skin would come nearer to the ball than it rests; heights stay."""
-        ball, es0 = self.ball, self.face.fapu.es0
-        moved = np.any(skin[ball.vertices] != 0.0, axis=1)
-        vertices = ball.vertices[moved]
-        local = ball.rest[moved] - ball.center
-        place = local + es0 * skin[vertices]
-        needed = ball.radius(place) * (1.0 + np.minimum(ball.clearance(local), LAYER))
-        front = np.sqrt(np.maximum(needed**2 - place[:, 0] ** 2 - place[:, 1] ** 2, 0.0))
-        before = (local[:, 2] > 0.0) & (place[:, 2] > 0.0)
-        skin[vertices, 2] += np.where(before, np.maximum(front - place[:, 2], 0.0), 0.0) / es0
-
     @property
     def middle(self) -> Floats:
         """(3,) the middle of the ball, in eye separations."""
@@ -272,11 +263,11 @@ def lid(face: PreparedFace, fap_id: int, unit: Offsets | None = None) -> Lid | N
 
 def _lid(face: PreparedFace, fap_id: int) -> Lid | None:
     side, part = LIDS[fap_id]
-    eye, pupil = _to_the_corners(eyes(face)[side]), face.place(("3.5", "3.6")[side])
-    near = [b for b in balls(face) if np.linalg.norm(b.center - pupil) < 2.0 * float(np.median(b.radii))]
-    if eye is None or not near:
+    eye = _to_the_corners(eyes(face)[side])
+    ball = eyeball(face, ("3.5", "3.6")[side])
+    if eye is None or ball is None:
         return None
-    center = near[0].center / face.fapu.es0
+    center = ball.center / face.fapu.es0
     corners = np.array([face.skin.positions[k] for k in EYES[side][0]])
     own, other = (_rim_line(eye, k, corners) - center for k in (part, 1 - part))
     heights = np.stack([own[:, 1], np.interp(own[:, 0], other[:, 0], other[:, 1])])
@@ -285,9 +276,38 @@ def _lid(face: PreparedFace, fap_id: int) -> Lid | None:
         heights[1, end] = heights[0, end] + way * min(way * (heights[1, inner] - heights[0, end]), 0.0)
     reach = np.stack([np.hypot(*own[:, 1:].T), np.interp(own[:, 0], other[:, 0], np.hypot(*other[:, 1:].T))])
     nothing = np.zeros(face.skin.vertex_count)
-    found = Lid(face, fap_id, eye, part, near[0], own[:, 0] + center[0], heights, reach, nothing, nothing)
+    found = Lid(face, fap_id, eye, part, ball, own[:, 0] + center[0], heights, reach, nothing, nothing)
     closing, opening = (_shares(found, above) for above in (CLOSING, OPENING))
     return replace(found, closing=closing, opening=opening)
+
+
+def keep_clear(face: PreparedFace, ball: Ball, skin: Floats, shift: Floats | float = 0.0) -> None:
+    """Push offsets (n, 3) of the skin forward where it would come nearer to the eyeball than it rests; heights stay.
+
+    Parameters
+    ----------
+    skin : in eye separations; changed in place, where it moves.
+    shift : (3,) by which the ball itself moves, in eye separations.
+    """
+    es0 = face.fapu.es0
+    moved = np.any(skin[ball.vertices] != 0.0, axis=1)
+    vertices = ball.vertices[moved]
+    local = ball.rest[moved] - ball.center
+    place = local + es0 * (skin[vertices] - shift)
+    needed = ball.radius(place) * (1.0 + np.minimum(ball.clearance(local), LAYER))
+    front = np.sqrt(np.maximum(needed**2 - place[:, 0] ** 2 - place[:, 1] ** 2, 0.0))
+    before = (local[:, 2] > 0.0) & (place[:, 2] + es0 * np.max(shift) > 0.0)
+    push = np.where(before, np.maximum(front - place[:, 2], 0.0), 0.0) / es0
+    if np.any(shift):
+        push *= _smoothstep((1.0 - np.hypot(place[:, 0], place[:, 1]) / needed) / GRAZED)
+    skin[vertices, 2] += push
+
+
+def eyeball(face: PreparedFace, pupil: str) -> Ball | None:
+    """The eyeball behind a pupil, 3.5 or 3.6; None where it is no mesh of its own."""
+    place = face.place(pupil)
+    near = [b for b in balls(face) if np.linalg.norm(b.center - place) < 2.0 * float(np.median(b.radii))]
+    return near[0] if near else None
 
 
 def _to_the_corners(eye: Eye | None) -> Eye | None:
