@@ -17,7 +17,7 @@ from authoring.names import Meaning
 from authoring.open_jaw import strict
 from authoring.recipes import TIED_FAPS, TIED_NOTE
 from authoring.report import AuthorReport, Entry, Step
-from authoring.units import FaceShapes, sort_shapes
+from authoring.units import ROTATIONS, FaceShapes, sort_shapes
 from cloning.parts import PUPILS, eye_center
 from cloning.prepare import NECESSARY, PreparedFace, prepare
 from fat.build import build_tables
@@ -26,7 +26,7 @@ from fat.evaluate import Player
 from fat.face import AnimatableFace
 from fat.motion import FaceMotion
 from fat.open_jaw import JAW, NOTE, open_jaw_mode
-from fat.rig import EYE_FAPS, HEAD_FAPS, RigTables, rig_eye, rig_head
+from fat.rig import RigTables, rig_eye, rig_head
 from fat.tables import table_name
 from fba.arrays import Floats
 from fba.errors import LandmarkError
@@ -41,9 +41,6 @@ OpenJaw = Literal["practical", "strict"]
 Progress = Callable[[str, float], None]
 T = TypeVar("T")
 K = TypeVar("K")
-
-ROTATIONS = (*(n for rows in EYE_FAPS.values() for _, n in rows), *(n for _, n in HEAD_FAPS))
-"""FAPs of eyeballs and head: transforms, not shapes."""
 
 
 def author(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
-from authoring import brows, cheeks, chin, ears, jaw, lids, lips, nose, tongue
+from authoring import brows, cheeks, chin, ears, eyes, jaw, lids, lips, nose, tongue
 from authoring.construction import Construction
 from cloning.prepare import PreparedFace
 from fat.motion import FaceMotion
@@ -14,7 +14,7 @@ from fba.errors import FbaError
 from fba.faps import fap
 from fba.findings import Finding
 
-_MODULES = (lips, brows, cheeks, chin, nose, ears, jaw, lids, tongue)
+_MODULES = (lips, brows, cheeks, chin, nose, ears, jaw, lids, tongue, eyes)
 
 
 @cache

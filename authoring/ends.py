@@ -15,7 +15,7 @@ CLOSE = 0.02
 """The end is found to within this share of the first border that folds."""
 
 
-SPARE = 0.9
+SPARE = 0.8
 """Share of the limit that is used: a table leaves out the smallest offsets, which count among the moving ones here."""
 
 

@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from authoring import jaw, lids
 from authoring.construct import construct
 from authoring.construction import Offsets
 from authoring.ends import unfolded
 from authoring.from_units import UnitMaker, UnitMotion
+from authoring.names import SIDES
 from authoring.recipes import RECIPES, UNITS_FIRST
 from authoring.report import How, Step
-from authoring.units import FaceShapes, Given
+from authoring.units import PUPIL, FaceShapes, Given
 from cloning.prepare import PreparedFace
+from fat.conformance import Probe
+from fat.face import AnimatableFace
 from fat.motion import FaceMotion
-from fat.quality import feature_point_motion
+from fat.tables import FaceDefTables
+from fba.arrays import Floats
 from fba.faps import Fap, fap
 from fba.findings import Finding
 
 JAW = 3
+PUPIL_FAPS = (29, 30)
 
 ARCS: Mapping[int, Sequence[int]] = {
     JAW: jaw.OPEN_BORDERS,
@@ -113,29 +119,52 @@ class LowLevel:
 
     def _calibrated(self, entry: Fap, given: Given) -> tuple[int, float, str]:
         """The value that a given shape shows, the factor that makes it exact, and what is wrong."""
-        moved = feature_point_motion(self.face.points, given.offsets).get(entry.feature_points[0])
-        if entry.direction is None or moved is None:
+        shown = self._shown(entry, given.offsets)
+        if shown is None:
             if given.value is None:
                 return 0, 0.0, f"nothing measures the value at which it shows {entry.name}; a map (--map) must say it"
             return given.value, 1.0, ""
-        along = float(moved @ entry.direction) / self.face.fapu.unit(entry.unit)
-        value = given.value if given.value is not None else round(along)
+        value = given.value if given.value is not None else round(shown)
         if value == 0:
-            return (
-                0,
-                0.0,
-                (
-                    f"it does not move the feature point {entry.feature_points[0]} along the axis of {entry.name}; "
-                    "a map (--map) can say which value it shows"
-                ),
+            text = (
+                f"it does not move the feature point {entry.feature_points[0]} as {entry.name} does; a map (--map) can "
+                "say which value it shows"
             )
-        factor = value / along if along else 0.0
+            return 0, 0.0, text
+        factor = value / shown if shown else 0.0
         if not 1.0 / MOST_SCALED <= factor <= MOST_SCALED:
-            text = f"it moves its feature point by {along:.0f} FAP units, not by {value}; it is used as it is"
-            return value, 1.0, text
+            return value, 1.0, f"it moves its feature point by {shown:.0f} FAP units, not {value}; it is used as it is"
         return value, factor, ""
 
+    def _shown(self, entry: Fap, offsets: Offsets) -> float | None:
+        """The FAP value that a motion shows; None where the face has nothing to measure it at."""
+        moved = {name: rest + offsets.get(name, 0.0) for name, rest in self._rest.items()}
+        found = self._probe.measure(entry, 1, moved)
+        return None if found is None else found.found
+
+    @cached_property
+    def _rest(self) -> dict[str, Floats]:
+        return {s.name: self.face.scene.world_vertices(s.name) for s in self.face.scene.shapes}
+
+    @cached_property
+    def _probe(self) -> Probe:
+        bare = AnimatableFace(self.face.scene, self.face.points, FaceDefTables(()), self.face.fapu)
+        return Probe(bare, self._rest)
+
+    def _dilated(self, entry: Fap) -> dict[int, tuple[Offsets, Step]] | str:
+        """A pupil that a unit widens; it narrows along the same line."""
+        name = f"{PUPIL}{SIDES[PUPIL_FAPS.index(entry.id)]}"
+        unit = self.maker.units.get(name)
+        shown = None if unit is None else self._shown(entry, unit)
+        if unit is None or shown is None or not shown > 0.0:
+            return f"there is no {name}" if unit is None else f"{name} does not widen the pupil"
+        factor = round(shown) / shown
+        offsets = {shape: factor * part for shape, part in unit.items()}
+        return {round(shown): (offsets, Step(round(shown), "units", self._named({name: 1.0}, factor)))}
+
     def _from_units(self, entry: Fap, sign: int) -> dict[int, tuple[Offsets, Step]] | str:
+        if entry.id in PUPIL_FAPS:
+            return self._dilated(entry) if sign > 0 else "a pupil narrows along the line on which it widens"
         recipe = RECIPES.get(entry.id)
         if recipe is None:
             return "no unit shows it"

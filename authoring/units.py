@@ -12,6 +12,7 @@ from authoring.construction import Offsets
 from authoring.names import GAZES, SIDES, Meaning, meaning
 from authoring.riders import skin_offsets
 from cloning.prepare import PreparedFace
+from fat.rig import EYE_FAPS, HEAD_FAPS
 from fba.arrays import Floats
 from fba.errors import MeshError
 from fba.faps import EXPRESSION_FAP, VISEME_FAP
@@ -24,6 +25,12 @@ HALF_WIDTH = 0.12
 
 MOVES = 0.02
 """Skin that moves by more than this, in eye separations, takes along what lies on it, unless that is known to rest."""
+
+PUPIL = "pupilDilate"
+"""The unit that lives on the eyeballs."""
+
+ROTATIONS = (*(n for rows in EYE_FAPS.values() for _, n in rows), *(n for _, n in HEAD_FAPS))
+"""FAPs of eyeballs and head: transforms, not shapes."""
 
 RESTING = (Role.EYE_LEFT, Role.EYE_RIGHT, Role.UPPER_TEETH)
 """Parts that units leave where they are: eyeballs turn by FAPs 23 to 26, the upper teeth belong to the skull."""
@@ -149,8 +156,10 @@ def sort_shapes(
         taken[said.key] = name
         if said.kind == "ignored":
             ignored[name] = said.unit
+        elif said.kind == "fap" and said.number in ROTATIONS:
+            ignored[name] = "eyes and head turn exactly by transforms"
         elif said.kind == "unit":
-            units[said.unit] = resting(face, moved)
+            units[said.unit] = moved if said.unit.startswith(PUPIL) else resting(face, moved)
             origin[said.unit] = name
             if said.unit.startswith(GAZES):
                 ignored[name] = "eyes turn exactly by FAPs 23 to 26"
