@@ -8,7 +8,7 @@ import numpy as np
 
 from fat.face import AnimatableFace
 from fat.intervals import IntervalRule, interval_rule
-from fba.arrays import Bools, Floats, Ints
+from fba.arrays import Floats, Ints
 from fba.faps import fap
 from fba.feature_points import FeaturePoints
 
@@ -31,8 +31,7 @@ class Response:
 
     def __init__(self, face: AnimatableFace, probes: Sequence[Probe]) -> None:
         self._count = len(probes)
-        effect = _effects(face, probes)
-        seen: dict[str, Bools] = {name: np.asarray(part.any(axis=(1, 2))) for name, part in effect.items()}
+        effects = _effects(face, probes)
         rules: list[IntervalRule] = []
         table_of: list[int] = []
         self._rows: list[slice] = []
@@ -43,11 +42,12 @@ class Response:
             bends: set[float] = set()
             start = len(table_of)
             for mesh in table.meshes:
-                if mesh.shape not in effect:
+                if mesh.shape not in effects:
                     continue
-                (moving,) = np.nonzero(seen[mesh.shape][mesh.coord_index])
-                local = effect[mesh.shape][mesh.coord_index[moving]]
-                moved = np.einsum("kjc,kcp->jp", mesh.displacements[moving], local)
+                row_of, effect = effects[mesh.shape]
+                rows = row_of[mesh.coord_index]
+                seen = rows >= 0
+                moved = np.einsum("kjc,kcp->jp", mesh.displacements[seen], effect[rows[seen]])
                 if not moved.any():
                     continue
                 rules.append(interval_rule(mesh.interval_borders))
@@ -89,17 +89,28 @@ def points_on_surface(face: AnimatableFace) -> FeaturePoints:
     )
 
 
-def _effects(face: AnimatableFace, probes: Sequence[Probe]) -> dict[str, Floats]:
-    """Shape -> (n, 3, P): how much each probe grows when a vertex moves by one unit of its local axes."""
-    counts = {s.name: s.mesh.vertex_count for s in face.scene.shapes}
+def _effects(face: AnimatableFace, probes: Sequence[Probe]) -> dict[str, tuple[Ints, Floats]]:
+    """How much each probe grows when a vertex moves by one unit of its local axes.
+
+    Returns
+    -------
+    Shape -> (n,) row of each vertex, -1 where no probe looks at it, and the rows (r, 3, P).
+    """
     points = points_on_surface(face)
-    found: dict[str, Floats] = {}
-    for number, probe in enumerate(probes):
-        for key, direction in probe.items():
-            if key not in points:
-                continue
-            name = str(points[key].shape)
-            local = np.asarray(direction) @ face.scene.world_matrix(name)[:3, :3]
-            effect = found.setdefault(name, np.zeros((counts[name], 3, len(probes))))
-            np.add.at(effect[:, :, number], list(points[key].vertices), np.outer(points[key].weights, local))
+    used: dict[str, set[int]] = {}
+    for key in {key for probe in probes for key in probe} & points.keys():
+        used.setdefault(str(points[key].shape), set()).update(points[key].vertices)
+    found = {}
+    for name in sorted(used):
+        vertices = np.array(sorted(used[name]), dtype=np.int32)
+        row_of = np.full(face.scene.shape(name).mesh.vertex_count, -1, dtype=np.int32)
+        row_of[vertices] = np.arange(vertices.size)
+        linear = face.scene.world_matrix(name)[:3, :3]
+        effect = np.zeros((vertices.size, 3, len(probes)))
+        for number, probe in enumerate(probes):
+            for key, direction in probe.items():
+                if key in points and points[key].shape == name:
+                    weights = np.outer(points[key].weights, np.asarray(direction) @ linear)
+                    np.add.at(effect[:, :, number], row_of[list(points[key].vertices)], weights)
+        found[name] = (row_of, effect)
     return found
