@@ -33,6 +33,9 @@ SOFT = 0.02
 """How far, relative to its own stiffness, a place between feature points gives way: on a coarse mesh several lie in
 one triangle and would tear at it."""
 
+LOOSE = 1e-12
+"""Stiffness of every place, relative to its bending: a piece of skin that hangs on nothing else must not fly off."""
+
 UNTOUCHED = 1e-12
 """A place whose vertices have less weight than this is held still anyway."""
 
@@ -202,7 +205,8 @@ class Patch:
         stretch, area = _stiffness(lying[self.triangles], self.share, self.corners)
         inverse = diags_array(1.0 / np.maximum(area, SMALLEST * float(area.mean())))
         columns = stretch.tocsc()[:, self.columns]
-        return csc_array(columns.T @ inverse @ columns)
+        bending = csc_array(columns.T @ inverse @ columns)
+        return bending + diags_array(np.full(len(self.places), LOOSE * float(bending.diagonal().mean())), format="csc")
 
 
 _MADE: WeakKeyDictionary[PreparedFace, Bumps] = WeakKeyDictionary()

@@ -127,6 +127,14 @@ def test_places_between_points_are_met_about() -> None:
     assert found == pytest.approx([0.2, 0.8], abs=0.1)
 
 
+def test_a_loose_piece_goes_along_as_a_whole() -> None:
+    """Where no skin around is held, nothing bends: the whole piece moves with its point."""
+    vertices, faces = grid(10)
+    maker = plate(vertices, faces, p10_1=(0.0, 0.5))
+    weight = bump(maker, np.ones(len(vertices), dtype=bool), {"10.1": 1.0})
+    assert weight == pytest.approx(np.ones(len(vertices)), abs=0.01)
+
+
 def test_pins_are_the_points_that_faps_move_along_an_axis() -> None:
     assert {"2.2", "2.3", "8.1", "4.3"} <= set(pinned(1))
     assert "4.3" not in pinned(0)
