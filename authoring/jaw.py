@@ -93,8 +93,11 @@ SOFT = 0.12
 MODELLED = 0.04
 """The same where the shares come from a modelled jaw: just enough to take its bumps away."""
 
-THROAT = 0.85
-"""The neck rests from this far below the chin, in eye separations."""
+THROAT = 1.1
+"""The neck rests from this far below the chin, in eye separations ..."""
+
+NECK_END = 0.05
+"""... or this far above the lower end of the skin, where a body may go on."""
 
 CORNERS = ("2.4", "2.5")
 
@@ -250,6 +253,11 @@ def joints(face: PreparedFace) -> tuple[Floats, Floats, list[Finding]]:
     return place["7.1"], np.array([1.0, 0.0, 0.0]), [said]
 
 
+def findings(face: PreparedFace) -> list[Finding]:
+    """What had to be assumed about the jaw of a face."""
+    return joints(face)[2]
+
+
 def open_jaw(face: PreparedFace, values: Iterable[int], unit: Offsets | None = None) -> dict[int, Offsets]:
     """FAP 3 at each of these values; the jaw carries the lower lip ("practical").
 
@@ -270,7 +278,8 @@ def _constructed(
     wanted, firmness = np.zeros(skin.vertex_count), np.zeros(skin.vertex_count)
     firmness[_resting(face, joint, axis)] = 1.0
     upper, lower = (_distance(face, skin.vertices * face.fapu.es0, r) for r in (Role.UPPER_TEETH, Role.LOWER_TEETH))
-    beside = (np.minimum(upper, lower) < BESIDE_TEETH) & (np.abs(upper - lower) > 0.5 * BESIDE_TEETH)
+    nearer = np.minimum(upper, lower)
+    beside = (nearer < BESIDE_TEETH) & (np.maximum(upper, lower) > nearer + 0.5 * BESIDE_TEETH)
     firmness[beside] = lined
     wanted[beside & (lower < upper)] = 1.0
     corners = [i for i in CORNERS if i in skin.points]
@@ -280,6 +289,8 @@ def _constructed(
         if key in skin.points:
             vertices, weights = skin.points[key]
             wanted[vertices], firmness[vertices] = share, np.maximum(firmness[vertices], HELD * weights)
+            if share == 0.0:
+                firmness[vertices[weights > 0.0]] = np.inf
     return spread(skin)(wanted, firmness, SOFT)
 
 
@@ -289,7 +300,8 @@ def _resting(face: PreparedFace, joint: Floats, axis: Floats) -> Bools:
     up = _unit(np.cross(place["9.15"] - joint, axis))
     above = local @ up > 0.0
     behind = local[:, 2] < 0.0
-    neck = face.skin.vertices[:, 1] < place["2.1"][1] - THROAT
+    height = face.skin.vertices[:, 1]
+    neck = height < max(float(place["2.1"][1]) - THROAT, float(height.min()) + NECK_END)
     return np.asarray(above | behind | neck)
 
 
