@@ -25,6 +25,8 @@ CORNER = 0.15
 """On a finer skin the lips meet half-way in this outer share of the mouth, whose corners curve down by themselves."""
 TONGUE_CLEARANCE = 0.02
 """The tip stays this far (ES0) behind the front of the teeth, whose strips have no thickness."""
+TONGUE_FLAT = 0.5
+"""Share by which what rises above the tip is lowered where teeth are shown: the neutral tongue is flat."""
 LASHES = (("lashes_left", "eye_left"), ("lashes_right", "eye_right"))
 LASH_ROWS = 5
 """Rows of vertices of a strip of lashes from the lid to the tips."""
@@ -34,12 +36,13 @@ LASH_LENGTH = 0.4
 SIDES = (("left", "3.1", "3.3", "3.5"), ("right", "3.2", "3.4", "3.6"))
 
 
-def neutral(head: Head, opening: float) -> Head:
+def neutral(head: Head, opening: float, show: float = 0.0) -> Head:
     """Return the head with lids tangent to the iris, lips closed on a level line, and teeth and tongue in place.
 
     Parameters
     ----------
     opening : of the lids = diameter of the iris, in ES0.
+    show : how far the upper teeth reach below where MakeHuman's do, in ES0.
     """
     head = _lids(replace(head, placed={**head.placed, **lid_points(head)}), opening)
     if head.fairing is not None:
@@ -48,7 +51,7 @@ def neutral(head: Head, opening: float) -> Head:
     for _ in range(PASSES):
         head = head.moved({"skin": close_lips(head)})
     head = replace(head, placed={**head.placed, **lip_points(head)})
-    return _lashes(_teeth(head))
+    return _lashes(_teeth(head, show))
 
 
 def lid_points(head: Head) -> dict[str, FeaturePoint]:
@@ -156,14 +159,20 @@ def _lashes(head: Head) -> Head:
     return head.moved(offsets)
 
 
-def _teeth(head: Head) -> Head:
-    """Raise the lower teeth to the upper ones; bring the tip of the tongue to the line where they meet."""
+def _teeth(head: Head, show: float) -> Head:
+    """Lower the upper teeth, raise the lower ones to them; bring the tip of the tongue to the line where they meet."""
     p = head.positions
-    teeth = np.zeros_like(head.parts["lower_teeth"])
-    teeth[:, 1] = p["9.10"][1] - p["9.11"][1]
+    down = np.array([0.0, -show * head.fapu.es0, 0.0])
+    upper = np.zeros_like(head.parts["upper_teeth"]) + down
+    lower = np.zeros_like(head.parts["lower_teeth"]) + down
+    lower[:, 1] += p["9.10"][1] - p["9.11"][1]
     tongue = head.parts["tongue"]
     back = tongue[:, 2].min()
     share = smoothstep((tongue[:, 2] - back) / (p["6.1"][2] - back))
-    touch = p["9.10"] - p["6.1"]
+    touch = p["9.10"] + down - p["6.1"]
     touch[2] -= TONGUE_CLEARANCE * head.fapu.es0
-    return head.moved({"lower_teeth": teeth, "tongue": share[:, None] * touch})
+    tongue = tongue + share[:, None] * touch
+    tip = p["6.1"] + touch
+    if show > 0.0:
+        tongue[:, 1] -= TONGUE_FLAT * np.maximum(tongue[:, 1] - tip[1], 0.0)
+    return head.moved({"upper_teeth": upper, "lower_teeth": lower, "tongue": tongue - head.parts["tongue"]})

@@ -19,6 +19,8 @@ RACES = {"caucasian": 0.35, "asian": 0.35, "african": 0.3}
 SEXES = {"female": 0.6, "male": 0.4}
 LID_OPENING = 0.155
 """Of the eye separation: nearly MakeHuman's own; the iris is as wide."""
+TEETH_SHOWN = 0.035
+"""Of the eye separation: the edge of human upper incisors lies about two millimetres below the resting upper lip."""
 
 
 def source_head(makehuman: MakeHuman) -> Head:
@@ -29,7 +31,7 @@ def source_head(makehuman: MakeHuman) -> Head:
             for key, weight in macro(race, sex, "young", share * part).items():
                 mixture[key] = mixture.get(key, 0.0) + weight
     coarse = build_head(SymmetricMakeHuman(makehuman.read), mixture, "source")
-    return neutral(fine(coarse), LID_OPENING)
+    return neutral(fine(coarse), LID_OPENING, TEETH_SHOWN)
 
 
 def build_source(makehuman: MakeHuman) -> AnimatableFace:
