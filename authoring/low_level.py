@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from authoring import jaw, lids
@@ -13,7 +13,7 @@ from authoring.ends import unfolded
 from authoring.from_units import UnitMaker, UnitMotion
 from authoring.names import SIDES
 from authoring.recipes import RECIPES, UNITS_FIRST
-from authoring.report import How, Step
+from authoring.report import Step
 from authoring.units import PUPIL, FaceShapes, Given
 from cloning.prepare import PreparedFace
 from fat.conformance import Probe
@@ -58,6 +58,7 @@ class LowLevel:
     shapes: FaceShapes
     maker: UnitMaker
     constructing: bool
+    _made: dict[int, tuple[list[FaceMotion], list[Finding]]] = field(default_factory=dict)
 
     def make(self, fap_id: int) -> Made:
         """One FAP, each side from the best that there is; no motions if there is nothing."""
@@ -197,9 +198,10 @@ class LowLevel:
     def _constructed(self, entry: Fap, sign: int) -> dict[int, tuple[Offsets, Step]] | str:
         if not self.constructing:
             return "constructions were not asked for"
-        motions, findings = construct(self.face, entry.id)
-        how: How = "constructed"
-        rows = {m.value: (dict(m.offsets), Step(m.value, how, {})) for m in motions if m.value * sign > 0}
+        if entry.id not in self._made:
+            self._made[entry.id] = construct(self.face, entry.id)
+        motions, findings = self._made[entry.id]
+        rows = {m.value: (dict(m.offsets), Step(m.value, "constructed", {})) for m in motions if m.value * sign > 0}
         if rows:
             return rows
         return "; ".join(f.message for f in findings) or f"the construction of {entry.name} has no such side"
