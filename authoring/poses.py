@@ -7,23 +7,24 @@ from collections.abc import Mapping
 from authoring.recipes import both
 from fat.profiles.tables import profile_table
 
-TONGUE_UP = "tongueUp"
-"""Name of a pose's own unit beside ARKit's: the front of the tongue behind the upper teeth (FAPs 44 and 45)."""
+TONGUE_UP, TONGUE_BACK, TONGUE_DOWN = "tongueUp", "tongueBack", "tongueDown"
+"""Names of the poses' own units beside ARKit's: the front of the tongue behind the upper teeth (FAPs 44 and 45), its body
+at the palate, its body low (FAP 46)."""
 
 VISEME_POSES: dict[str, dict[str, float]] = {
     "PP": {**both("mouthPress", 0.6), "mouthRollLower": 0.25, "mouthRollUpper": 0.3},
-    "FF": {"jawOpen": 0.06, "mouthRollLower": 1.0, "mouthShrugLower": 0.2, **both("mouthUpperUp", 0.5)},
+    "FF": {"mouthRollLower": 0.45, "mouthShrugUpper": 0.2, **both("mouthUpperUp", 0.5)},
     "TH": {"jawOpen": 0.17, "tongueOut": 0.35, **both("mouthUpperUp", 0.25)},
-    "DD": {"jawOpen": 0.12, TONGUE_UP: 0.7, **both("mouthUpperUp", 0.3), **both("mouthLowerDown", 0.3)},
-    "kk": {"jawOpen": 0.2, **both("mouthUpperUp", 0.25), **both("mouthLowerDown", 0.2)},
-    "CH": {"jawOpen": 0.08, "mouthFunnel": 0.75, "mouthPucker": 0.3, **both("mouthUpperUp", 0.2)},
-    "SS": {"jawOpen": 0.04, **both("mouthStretch", 0.5), **both("mouthUpperUp", 0.35), **both("mouthLowerDown", 0.45)},
-    "nn": {"jawOpen": 0.15, TONGUE_UP: 0.9, **both("mouthUpperUp", 0.2), **both("mouthLowerDown", 0.2)},
-    "RR": {"jawOpen": 0.12, "mouthFunnel": 0.45, "mouthPucker": 0.35, TONGUE_UP: 0.3},
-    "aa": {"jawOpen": 0.6, **both("mouthUpperUp", 0.25)},
+    "DD": {"jawOpen": 0.12, TONGUE_UP: 0.35, **both("mouthUpperUp", 0.3), **both("mouthLowerDown", 0.3)},
+    "kk": {"jawOpen": 0.2, TONGUE_BACK: 1.0, **both("mouthUpperUp", 0.25), **both("mouthLowerDown", 0.2)},
+    "CH": {"jawOpen": 0.05, "mouthFunnel": 0.75, "mouthPucker": 0.3, **both("mouthUpperUp", 0.1)},
+    "SS": {"jawOpen": 0.03, **both("mouthStretch", 0.5), **both("mouthUpperUp", 0.45), **both("mouthLowerDown", 0.4)},
+    "nn": {"jawOpen": 0.15, TONGUE_UP: 0.45, **both("mouthUpperUp", 0.3), **both("mouthLowerDown", 0.2)},
+    "RR": {"jawOpen": 0.15, "mouthFunnel": 0.5, "mouthPucker": 0.3, TONGUE_UP: 0.3},
+    "aa": {"jawOpen": 0.6, TONGUE_DOWN: 0.5, **both("mouthUpperUp", 0.25)},
     "E": {"jawOpen": 0.3, **both("mouthStretch", 0.5), **both("mouthUpperUp", 0.3), **both("mouthLowerDown", 0.15)},
     "ih": {"jawOpen": 0.16, **both("mouthStretch", 0.4), **both("mouthSmile", 0.25), **both("mouthUpperUp", 0.25)},
-    "oh": {"jawOpen": 0.4, "mouthFunnel": 0.65},
+    "oh": {"jawOpen": 0.4, "mouthFunnel": 0.6, "mouthPucker": 0.25},
     "ou": {"jawOpen": 0.1, "mouthPucker": 0.9, "mouthFunnel": 0.35},
 }
 
@@ -76,6 +77,8 @@ EXPRESSION_POSES: dict[str, dict[str, float]] = {
 
 _MORE: dict[str, dict[int, float]] = {
     TONGUE_UP: {44: 450, 45: 40},
+    TONGUE_BACK: {46: 350},
+    TONGUE_DOWN: {46: -300},
     "tongueOut": {45: 500},
     "browInnerUpLeft": {31: 120, 33: 40},
     "browInnerUpRight": {32: 120, 34: 40},

@@ -25,7 +25,7 @@ CORNER = 0.15
 """On a finer skin the lips meet half-way in this outer share of the mouth, whose corners curve down by themselves."""
 TONGUE_CLEARANCE = 0.02
 """The tip stays this far (ES0) behind the front of the teeth, whose strips have no thickness."""
-TONGUE_FLAT = 0.5
+TONGUE_FLAT = 0.35
 """Share by which what rises above the tip is lowered where teeth are shown: the neutral tongue is flat."""
 LASHES = (("lashes_left", "eye_left"), ("lashes_right", "eye_right"))
 LASH_ROWS = 5
