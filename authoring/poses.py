@@ -8,8 +8,8 @@ from authoring.recipes import both
 from fat.profiles.tables import profile_table
 
 TONGUE_UP, TONGUE_BACK, TONGUE_DOWN = "tongueUp", "tongueBack", "tongueDown"
-"""Names of the poses' own units beside ARKit's: the front of the tongue behind the upper teeth (FAPs 44 and 45), its body
-at the palate, its body low (FAP 46)."""
+"""Names of the poses' own units beside ARKit's: the front of the tongue behind the upper teeth (FAPs 44 and 45), its
+body at the palate, its body low (FAP 46)."""
 
 VISEME_POSES: dict[str, dict[str, float]] = {
     "PP": {**both("mouthPress", 0.6), "mouthRollLower": 0.25, "mouthRollUpper": 0.3},
