@@ -165,7 +165,8 @@ class LowLevel:
 
     def _from_units(self, entry: Fap, sign: int) -> dict[int, tuple[Offsets, Step]] | str:
         if entry.id in PUPIL_FAPS:
-            return self._dilated(entry) if sign > 0 else "a pupil narrows along the line on which it widens"
+            pupil = self._dilated(entry)
+            return pupil if sign > 0 or isinstance(pupil, str) else "a pupil narrows along the line on which it widens"
         recipe = RECIPES.get(entry.id)
         if recipe is None:
             return "no unit shows it"
@@ -204,4 +205,5 @@ class LowLevel:
         rows = {m.value: (dict(m.offsets), Step(m.value, "constructed", {})) for m in motions if m.value * sign > 0}
         if rows:
             return rows
-        return "; ".join(f.message for f in findings) or f"the construction of {entry.name} has no such side"
+        reasons = [f.message.removeprefix(f"{entry.name} is ") for f in findings]
+        return "; ".join(reasons) or f"the construction has no {'negative' if sign < 0 else 'positive'} side"
