@@ -17,10 +17,11 @@ import numpy as np
 
 from authoring.construction import Construction, Offsets
 from authoring.riders import skin_offsets
-from authoring.spread import mesh_spread, spread
+from authoring.spread import spread
+from authoring.tongue import tongue
 from cloning.bodies import Body, body
 from cloning.prepare import PreparedFace
-from cloning.surface import seam_links
+from cloning.surface import Surface
 from fba.arrays import Bools, Floats
 from fba.faps import fap
 from fba.findings import Finding
@@ -94,10 +95,10 @@ MODELLED = 0.04
 """The same where the shares come from a modelled jaw: just enough to take its bumps away."""
 
 THROAT = 1.1
-"""The neck rests from this far below the chin, in eye separations ..."""
+"""The neck rests from this far below the chin, in eye separations."""
 
 NECK_END = 0.05
-"""... or this far above the lower end of the skin, where a body may go on."""
+"""So far above its lower end the skin stays exactly where it is, in eye separations: a body may go on there."""
 
 CORNERS = ("2.4", "2.5")
 
@@ -204,17 +205,16 @@ class Jaw:
 
     def _below(self, part: Body) -> Floats:
         """Shares of a tongue: 1, but upper gums that are one mesh with it stay with the upper teeth."""
-        es0 = self.face.fapu.es0
+        made = tongue(self.face)
         upper, lower = (_distance(self.face, part.vertices, r) for r in (Role.UPPER_TEETH, Role.LOWER_TEETH))
-        above = (upper < BESIDE_TEETH) & (upper < 0.5 * lower)
+        if made is None:
+            return np.ones(len(part.vertices))
+        above = (made.free < 0.5) & (upper < BESIDE_TEETH) & (upper < lower)
         if not above.any():
             return np.ones(len(part.vertices))
-        places = part.vertices / es0
-        plate = mesh_spread(places, part.triangles, seam_links(places, part.indices, part.offsets))
-        ids = [i for i in ("6.1", "6.2", "6.3", "6.4") if i in self.face.points]
-        tongue = np.any([_away(places, self.face.skin.positions[i]) < 2.0 * BESIDE_TEETH for i in ids], axis=0)
-        below = ~above & ((lower < BESIDE_TEETH) | tongue)
-        return plate(np.where(above, 0.0, 1.0), (above | below).astype(float), 0.5 * SOFT)
+        below = ~above & ((lower < BESIDE_TEETH) | (made.free > 0.5))
+        firmness = np.where(above, np.inf, below.astype(np.float64))
+        return spread(made.surface)(np.where(above, 0.0, 1.0), firmness, 0.5 * SOFT)
 
 
 def jaw(face: PreparedFace, unit: Offsets | None = None) -> Jaw:
@@ -277,6 +277,7 @@ def _constructed(
     skin = face.skin
     wanted, firmness = np.zeros(skin.vertex_count), np.zeros(skin.vertex_count)
     firmness[_resting(face, joint, axis)] = 1.0
+    firmness[_lower_end(skin)] = np.inf
     upper, lower = (_distance(face, skin.vertices * face.fapu.es0, r) for r in (Role.UPPER_TEETH, Role.LOWER_TEETH))
     nearer = np.minimum(upper, lower)
     beside = (nearer < BESIDE_TEETH) & (np.maximum(upper, lower) > nearer + 0.5 * BESIDE_TEETH)
@@ -300,9 +301,12 @@ def _resting(face: PreparedFace, joint: Floats, axis: Floats) -> Bools:
     up = _unit(np.cross(place["9.15"] - joint, axis))
     above = local @ up > 0.0
     behind = local[:, 2] < 0.0
-    height = face.skin.vertices[:, 1]
-    neck = height < max(float(place["2.1"][1]) - THROAT, float(height.min()) + NECK_END)
+    neck = face.skin.vertices[:, 1] < place["2.1"][1] - THROAT
     return np.asarray(above | behind | neck)
+
+
+def _lower_end(skin: Surface) -> Bools:
+    return np.asarray(skin.vertices[:, 1] < skin.vertices[:, 1].min() + NECK_END)
 
 
 def _modelled(face: PreparedFace, joint: Floats, axis: Floats, unit: Offsets) -> Floats:
@@ -315,7 +319,9 @@ def _modelled(face: PreparedFace, joint: Floats, axis: Floats, unit: Offsets) ->
     angle = np.arctan2(np.cross(before, after) @ axis, np.einsum("ij,ij->i", before, after))
     chin = float((skin.point_matrix(["2.1"]) @ angle)[0])
     lever = np.einsum("ij,ij->i", before, before)
-    return spread(skin)(np.clip(angle / chin, 0.0, 1.0), lever, MODELLED)
+    end = _lower_end(skin)
+    shares = np.where(end, 0.0, np.clip(angle / chin, 0.0, 1.0))
+    return spread(skin)(shares, np.where(end, np.inf, lever), MODELLED)
 
 
 def _unit_at_chin(face: PreparedFace, shares: Floats) -> Floats:
@@ -331,11 +337,6 @@ def _distance(face: PreparedFace, places: Floats, role: Role) -> Floats:
     if part is None:
         return np.full(len(places), np.inf)
     return np.asarray(cKDTree(part.vertices).query(places)[0]) / face.fapu.es0
-
-
-def _away(places: Floats, point: Floats) -> Floats:
-    distance: Floats = np.linalg.norm(places - point, axis=1)
-    return distance
 
 
 def _unit(vector: Floats) -> Floats:
