@@ -306,7 +306,9 @@ def _resting(face: PreparedFace, joint: Floats, axis: Floats) -> Bools:
 
 
 def _lower_end(skin: Surface) -> Bools:
-    return np.asarray(skin.vertices[:, 1] < skin.vertices[:, 1].min() + NECK_END)
+    """The end of the neck; nothing on a mask that ends with its chin."""
+    height = skin.vertices[:, 1]
+    return np.asarray(height < min(height.min() + NECK_END, skin.positions["2.1"][1] - NECK_END))
 
 
 def _modelled(face: PreparedFace, joint: Floats, axis: Floats, unit: Offsets) -> Floats:
