@@ -46,11 +46,14 @@ ROUND = 0.08
 FEWEST = 6
 """Vertices of a ring."""
 
-TOUCHES = 0.25
+TOUCHES = 0.15
 """Skin nearer to the ball than this, in radii, is pushed out with it."""
 
 IN_FRONT = 0.5
 """Cosine of the angle to the gaze within which it lies before the ball, not beside it."""
+
+HELD = 30.0
+"""How firmly the lids go with the ball: their margins would fold if one side stayed behind."""
 
 FOLLOWS_BACK = 0.15
 """Lids sink in by this share of the way of an eyeball that goes back."""
@@ -87,7 +90,7 @@ def _around(face: PreparedFace, pupil: str, ball: Ball) -> Floats:
         on_ball = (clear < TOUCHES) & (local[:, 2] > IN_FRONT * np.linalg.norm(local, axis=1))
         wanted[ball.vertices[on_ball]] = 1.0
         firmness[ball.vertices[clear < NEAR - 1.05]] = 0.0
-        firmness[ball.vertices[on_ball]] = 1.0
+        firmness[ball.vertices[on_ball]] = HELD
         for key in STILL_POINTS:
             if key in skin.points:
                 vertices, weights = skin.points[key]
