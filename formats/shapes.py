@@ -24,6 +24,7 @@ from formats import gltf, obj
 from formats.files import read_bytes
 from formats.npz import write_npz
 from formats.text_lines import TextLines
+from formats.wfm import read_animation_units
 
 _MOST_BYTES = 4 << 30
 """Unpacked size of an .npz beyond which it is refused: 88 targets of a 1,000,000-vertex face need half of it."""
@@ -38,7 +39,7 @@ def read_shapes(path: Path, neutral: FaceScene) -> ShapeSet:
     ----------
     path : a folder of OBJ files (or MakeHuman .target files), one for each target, named after it; an .npz with
         names (K,), deltas (K, N, 3) and optionally neutral (N, 3); a .glb or .gltf with morph targets; a .usda,
-        .usdc or .usd with blend shapes.
+        .usdc or .usd with blend shapes; a .wfm with Candide-3's animation units.
     neutral : the face that they belong to, N vertices.
 
     Raises
@@ -59,10 +60,12 @@ def read_shapes(path: Path, neutral: FaceScene) -> ShapeSet:
         found = _read_gltf(path, len(base))
     elif name.endswith((".usda", ".usdc", ".usd")):
         found = _read_usd(path, len(base))
+    elif name.endswith(".wfm"):
+        found = read_animation_units(path, len(base))
     elif not path.exists():
         raise InputFileError(f"{path} does not exist; check the path")
     else:
-        raise UnknownFormatError(f"{path}: morph targets come as a folder of OBJ files, .npz, glTF or USD")
+        raise UnknownFormatError(f"{path}: morph targets come as a folder of OBJ files, .npz, glTF, USD or .wfm")
     if not found:
         raise InputFileError(f"{path} holds no morph targets")
     deltas = np.empty((len(found), len(base), 3))

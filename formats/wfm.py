@@ -1,0 +1,92 @@
+"""Animation units of a Candide-3 model (.wfm): named offsets of some vertices, in plain text.
+
+A section ``# ANIMATION UNITS LIST:`` holds the number of units; each has a comment with its name, the number of its
+vertices, and a line ``vertex dx dy dz`` for each. (J. Ahlberg, "CANDIDE-3: an updated parameterised face",
+LiTH-ISY-R-2326.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from fba.arrays import Floats
+from fba.errors import InputFileError, TextSyntaxError
+from formats.files import read_bytes
+
+SECTION = "ANIMATION UNITS LIST"
+
+
+def read_animation_units(path: Path, count: int) -> list[tuple[str, Floats]]:
+    """Read the animation units.
+
+    Parameters
+    ----------
+    count : number of vertices of the neutral face.
+
+    Returns
+    -------
+    Name and offsets (count, 3) of each unit.
+
+    Raises
+    ------
+    InputFileError
+        If the file cannot be read, or holds no animation units.
+    TextSyntaxError
+        If a line is not what it should be; the message names it.
+    """
+    lines = read_bytes(path).decode("latin-1").splitlines()
+    start = next((k for k, line in enumerate(lines) if line.startswith("#") and SECTION in line), None)
+    if start is None:
+        raise InputFileError(f"{path} has no section '# {SECTION}:', so it holds no animation units")
+    rows = _Rows(path, lines, start + 1)
+    found: list[tuple[str, Floats]] = []
+    for _ in range(rows.number(f"the number of units after '# {SECTION}:'")):
+        amount = rows.number("the number of vertices of an animation unit")
+        name = rows.comment or f"unit {len(found) + 1}"
+        offsets = np.zeros((count, 3))
+        for _ in range(amount):
+            vertex, offset = rows.move(count)
+            offsets[vertex] += offset
+        found.append((name, offsets))
+    return found
+
+
+class _Rows:
+    """The lines of a section, one after the other; empty ones are left out, comments remembered."""
+
+    def __init__(self, path: Path, lines: list[str], start: int) -> None:
+        self.path = path
+        self.comment = ""
+        self._rest = self._words(lines, start)
+        self._line = start
+
+    def _words(self, lines: list[str], start: int) -> Iterator[list[str]]:
+        for number in range(start, len(lines)):
+            self._line = number + 1
+            text = lines[number].strip()
+            if text.startswith("#"):
+                self.comment = text.lstrip("# ").strip()
+            elif text:
+                yield text.split()
+
+    def number(self, what: str) -> int:
+        words = next(self._rest, [])
+        if len(words) != 1 or not words[0].isdigit():
+            raise self._error(f"expected {what}")
+        return int(words[0])
+
+    def move(self, count: int) -> tuple[int, list[float]]:
+        words = next(self._rest, [])
+        try:
+            vertex, offset = int(words[0]), [float(word) for word in words[1:]]
+        except (IndexError, ValueError):
+            raise self._error("expected a line 'vertex dx dy dz'") from None
+        if len(offset) != 3 or not np.isfinite(offset).all() or not 0 <= vertex < count:
+            raise self._error(f"expected a vertex of the neutral face (0 to {count - 1}) and three finite offsets")
+        return vertex, offset
+
+    def _error(self, message: str) -> TextSyntaxError:
+        return TextSyntaxError(message, self._line, 1, str(self.path))
