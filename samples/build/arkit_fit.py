@@ -15,8 +15,8 @@ from fba.faps import Unit, fap
 from samples.build.arkit_anatomy import OUTER_CORNER, mirror_shape, mirrored, related
 from samples.build.known_shapes import COMPARED, TURNS, KnownShapes
 
-POINTS = 2.0
-"""Feature points count this many times the skin: they are what FAP values mean."""
+POINTS, POINTS_BACK = 2.0, 1.0
+"""How many times the skin the feature points count: they are what FAP values mean, but shapes move many of them."""
 WORTH, WORTH_BACK = 0.01, 0.02
 """What a term must take off the sum of the two squared relative errors to stay: a FAP in a shape, a shape in a FAP."""
 SMALL, SMALL_BACK = 0.1, 0.05
@@ -86,7 +86,7 @@ def shape_to_faps(known: KnownShapes, name: str) -> dict[int, int]:
     terms = [
         Term(orbit, *_limits(k), SMALL * amplitudes()[k].positive) for orbit, k in zip(orbits, leading, strict=True)
     ]
-    values = _solve(known, wanted, terms, motions, WORTH)
+    values = _solve(known, wanted, terms, motions, WORTH, POINTS)
     found = {k: sign * v for orbit, v in zip(orbits, values, strict=True) for k, sign in orbit.items()}
     found |= _turns(known, name, wanted)
     return {k: round(v) for k, v in sorted(found.items()) if round(v)}
@@ -118,7 +118,7 @@ def fap_to_shapes(
         return [combine(known, dict.fromkeys(some, 1.0)) for some in (group, there)]
 
     terms = [Term(group, 0.0, MOST, SMALL_BACK) for group in groups]
-    weights = _solve(known, wanted, terms, motions, WORTH_BACK)
+    weights = _solve(known, wanted, terms, motions, WORTH_BACK, POINTS_BACK)
     found = {n: round(100.0 * w) for group, w in zip(groups, weights, strict=True) for n in group}
     return {n: w for n, w in found.items() if w}
 
@@ -162,6 +162,7 @@ def _solve(
     terms: Sequence[Term[T]],
     motions: Callable[[T, float], list[Floats]],
     worth: float,
+    emphasis: float,
 ) -> Floats:
     """Value of each term (t,); 0 for terms that are not worth it.
 
@@ -170,13 +171,14 @@ def _solve(
     wanted : motions (N, 3): that of one side and of its mirror image.
     motions : what a term stands for and its value -> the same two of it, for a value of 1.
     worth : what a term must take off the squared error.
+    emphasis : how many times the skin the feature points count.
     """
     values = np.zeros(len(terms))
     kept = list(range(len(terms)))
     for _ in range(STEPS):
         if kept:
             columns = [motions(terms[k].what, values[k]) for k in kept]
-            left, found = _thinned(_system(known, wanted, columns, [terms[k] for k in kept]), worth)
+            left, found = _thinned(_system(known, wanted, columns, [terms[k] for k in kept], emphasis), worth)
             places = [kept[k] for k in left]
             values[:] = 0.0
             values[places] = found
@@ -205,13 +207,17 @@ class _System:
 
 
 def _system(
-    known: KnownShapes, wanted: Sequence[Floats], columns: Sequence[Sequence[Floats]], terms: Sequence[Term[T]]
+    known: KnownShapes,
+    wanted: Sequence[Floats],
+    columns: Sequence[Sequence[Floats]],
+    terms: Sequence[Term[T]],
+    emphasis: float,
 ) -> _System:
     """Rows of feature points and of visible skin, each relative to the motion wanted there."""
     blocks, goals = [], []
     for place, goal in enumerate(wanted):
         skin = known.judged(goal)
-        points = max(known.point_motion(goal) / POINTS, 1e-12)
+        points = max(known.point_motion(goal) / emphasis, 1e-12)
         size = max(float(np.linalg.norm(goal[skin])), 1e-12)
 
         def rows(offsets: Floats, skin: Bools = skin, points: float = points, size: float = size) -> Floats:
