@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fba.arrays import Floats
 from fba.feature_points import FeaturePoint
+from fba.mesh import PolyMesh
 from samples.build.contact import LIDS, LIPS, edge_line, side_mask
 from samples.build.geodesic import smoothstep
 from samples.build.head import Head
@@ -25,11 +27,11 @@ CORNER = 0.15
 """On a finer skin the lips meet half-way in this outer share of the mouth, whose corners curve down by themselves."""
 TONGUE_CLEARANCE = 0.02
 """The tip stays this far (ES0) behind the front of the teeth, whose strips have no thickness."""
+LASH_ENDS = 0.3
+"""Length of the outermost lashes, of the middle ones'."""
 TONGUE_FLAT = 0.35
 """Share by which what rises above the tip is lowered where teeth are shown: the neutral tongue is flat."""
 LASHES = (("lashes_left", "eye_left"), ("lashes_right", "eye_right"))
-LASH_ROWS = 5
-"""Rows of vertices of a strip of lashes from the lid to the tips."""
 LASH_LENGTH = 0.4
 """Of MakeHuman's lashes: the strips are made for a texture with fine hairs, not for a plain colour."""
 
@@ -131,32 +133,48 @@ def lip_points(head: Head) -> dict[str, FeaturePoint]:
     return placed
 
 
-def lash_roots(head: Head) -> dict[str, NDArray[np.int64]]:
-    """Shape -> for each vertex of the lashes the vertex of the row on the lid that it grows from."""
-    found = {}
-    for name, eye in LASHES:
-        vertices = head.parts[name]
-        height = np.linalg.norm(vertices - head.eye_centers[eye][0], axis=1)
-        roots = np.argsort(height, kind="stable")[: len(vertices) // LASH_ROWS]
-        away = ((vertices[:, None] - vertices[roots][None]) ** 2).sum(axis=2)
-        found[name] = roots[np.argmin(away, axis=1)]
-    return found
-
-
 def _lashes(head: Head) -> Head:
     """Plant the lashes on the lids; shorten them, most at the ends."""
     offsets = {}
     skin = head.scene.shape("skin").mesh
-    for (name, eye), roots in zip(LASHES, lash_roots(head).values(), strict=True):
-        lashes, rows = head.parts[name], np.unique(roots)
-        outward = lashes[rows] - head.eye_centers[eye][0]
-        rim = nearest_facing(lashes[rows], outward / np.linalg.norm(outward, axis=1)[:, None], skin)
+    for name, eye in LASHES:
+        mesh = head.scene.shape(name).mesh
+        lashes = mesh.vertices
+        outward = lashes - head.eye_centers[eye][0]
+        roots = _roots(mesh, np.linalg.norm(outward, axis=1))
+        rows = np.unique(roots)
+        facing = outward[rows] / np.linalg.norm(outward[rows], axis=1)[:, None]
         planted = np.zeros_like(lashes)
-        planted[rows] = rim.carry(skin.vertices)
-        along = (lashes[:, 0] - lashes[rows, 0].min()) / np.ptp(lashes[rows, 0])
-        length = LASH_LENGTH * np.sqrt(np.clip(4.0 * along * (1.0 - along), 0.0, 1.0))
+        planted[rows] = nearest_facing(lashes[rows], facing, skin).carry(skin.vertices)
+        along = (lashes[roots, 0] - lashes[rows, 0].min()) / np.ptp(lashes[rows, 0])
+        length = LASH_LENGTH * (LASH_ENDS + (1.0 - LASH_ENDS) * 4.0 * along * (1.0 - along))
         offsets[name] = planted[roots] + length[:, None] * (lashes - lashes[roots]) - lashes
     return head.moved(offsets)
+
+
+def _roots(strip: PolyMesh, height: Floats) -> NDArray[np.int64]:
+    """For each vertex of a strip of quads the end of its row on the lower long side, (n,); height (n,)."""
+    neighbours: dict[int, list[int]] = {v: [] for v in range(strip.vertex_count)}
+    for a, b in strip.edges.tolist():
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    border = set(strip.edges[strip.edge_uses == 1].ravel().tolist())
+    corners = {v for v in border if len(neighbours[v]) == 2}
+    loop = [min(corners)]
+    while (onward := [v for v in neighbours[loop[-1]] if v in border and v not in loop[-2:]]) and onward[0] != loop[0]:
+        loop.append(onward[0])
+    cuts = [*(k for k, v in enumerate(loop) if v in corners), len(loop)]
+    sides = [[*loop, loop[0]][a : b + 1] for a, b in pairwise(cuts)]
+    long = sorted(sides, key=len)[2:]
+    front = min(long, key=lambda side: float(height[side].mean()))
+    found = np.full(strip.vertex_count, -1, dtype=np.int64)
+    found[front] = front
+    while front:
+        grown = [(v, w) for v in front for w in neighbours[v] if found[w] < 0]
+        for v, w in grown:
+            found[w] = found[v]
+        front = [w for _, w in grown]
+    return found
 
 
 def _teeth(head: Head, show: float) -> Head:

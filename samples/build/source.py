@@ -7,6 +7,7 @@ from dataclasses import replace
 from authoring.author import author
 from fat.compact import compact
 from fat.face import AnimatableFace
+from fba.arrays import Floats
 from fba.scene import FaceScene
 from samples.build.colors import skin_materials
 from samples.build.fine import fine
@@ -37,8 +38,14 @@ def source_head(makehuman: MakeHuman) -> Head:
 def build_source(makehuman: MakeHuman) -> AnimatableFace:
     """The animatable source: scene with nested eye and head rotations, feature points, tables."""
     head = source_head(makehuman)
-    face, _ = author(colored(head), head.points, {name: head.unit(name) for name in ARKIT_UNITS})
+    units = {name: _without_lashes(head.unit(name)) for name in ARKIT_UNITS}
+    face, _ = author(colored(head), head.points, units)
     return replace(face, tables=compact(face.tables, face.fapu))
+
+
+def _without_lashes(unit: dict[str, Floats]) -> dict[str, Floats]:
+    """The lashes were planted anew; they ride on the lids."""
+    return {name: offsets for name, offsets in unit.items() if not name.startswith("lashes")}
 
 
 def colored(head: Head) -> FaceScene:
