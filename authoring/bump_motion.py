@@ -21,7 +21,7 @@ from authoring.construction import Construction, Offsets
 from authoring.riders import skin_offsets
 from authoring.sliding import fit_round
 from cloning.prepare import PreparedFace
-from fba.arrays import Floats
+from fba.arrays import Bools, Floats
 from fba.faps import fap
 
 STEP = 0.5
@@ -125,7 +125,15 @@ class BumpMotion:
         at, points = face.skin.positions, face.skin.points
         near = [k for k in pins if k in points and free[points[k][0]].all()]
         step = STEP * min([radius, *(float(np.linalg.norm(at[k] - at[self.own])) for k in near)])
-        return _Bump(maker, goals, maker.patch(free), step, carrier(face) if self.carries else None)
+        carry = _on_side(carrier(face), maker.side(self.own)) if self.carries else None
+        return _Bump(maker, goals, maker.patch(free), step, carry)
+
+
+def _on_side(carry: Any, side: Bools) -> Any:
+    """The same, but skin that is not on a side (n,) stays still whatever moves before it."""
+    from scipy.sparse import diags_array
+
+    return carry if side.all() else diags_array(side.astype(np.float64)) @ carry
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,7 +45,10 @@ STEEPEST = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A place on the skin, between vertices (k,) with weights (k,), and the weight a bump must have there."""
+    """A place on the skin, between vertices (k,) with weights (k,), and the weight a bump must have there.
+
+    Weights that add up to 0 make it the difference of two places.
+    """
 
     vertices: Ints
     weights: Floats

@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from cloning.labels import OPPOSITE
 from cloning.prepare import PreparedFace
 from cloning.surface import Surface
 from cloning.visibility import visible
@@ -34,7 +35,10 @@ VIEWS = 7
 
 
 def carrier(face: PreparedFace) -> Any:
-    """(n, n) sparse: takes a weight over the skin to the one that hidden vertices have from the skin before them."""
+    """(n, n) sparse: takes a weight over the skin to the one that hidden vertices have from the skin before them.
+
+    Vertices that feature points lie on keep their own, so that these move exactly.
+    """
     if face not in _MADE:
         _MADE[face] = _carrier(face)
     return _MADE[face]
@@ -53,17 +57,24 @@ def _carrier(face: PreparedFace) -> Any:
     outer, hidden = np.flatnonzero(seen), np.flatnonzero(~seen)
     if not len(outer) or not len(hidden):
         return diags_array(np.ones(len(places)))
-    found = cKDTree(places[outer]).query(places[hidden], k=min(NEIGHBOURS, len(outer)))
-    away, near = (np.asarray(part).reshape(len(hidden), -1) for part in found)
-    share = 1.0 / np.maximum(away**2 + away[:, :1] ** 2, 1e-12)
-    inside = dijkstra(face.skin.graph, indices=outer, min_only=True, limit=DEEP[1])[hidden]
-    deep = _rise(inside, DEEP)
-    share *= (deep * (1.0 - _rise(away[:, 0], BEHIND)) / share.sum(axis=1))[:, None]
-    rows = np.repeat(hidden, near.shape[1])
-    carried = csr_array((share.ravel(), (rows, outer[near].ravel())), shape=(len(places), len(places)))
-    own = np.ones(len(places))
-    own[hidden] -= deep
-    return (diags_array(own) + carried).tocsr()
+    inside = dijkstra(face.skin.graph, indices=outer, min_only=True, limit=DEEP[1])
+    deep = np.zeros(len(places))
+    deep[hidden] = _rise(inside[hidden], DEEP)
+    deep[[vertex for vertices, _ in face.skin.points.values() for vertex in vertices]] = 0.0
+    labels, size = face.labels.values, (len(places), len(places))
+    carried = csr_array(size)
+    for side in np.unique(labels[hidden]).tolist():
+        behind = hidden[labels[hidden] == side]
+        before = outer[labels[outer] != OPPOSITE[side]]
+        if not len(before):
+            continue
+        found = cKDTree(places[before]).query(places[behind], k=min(NEIGHBOURS, len(before)))
+        away, near = (np.asarray(part).reshape(len(behind), -1) for part in found)
+        share = 1.0 / np.maximum(away**2 + away[:, :1] ** 2, 1e-12)
+        share *= (deep[behind] * (1.0 - _rise(away[:, 0], BEHIND)) / share.sum(axis=1))[:, None]
+        rows = np.repeat(behind, near.shape[1])
+        carried = carried + csr_array((share.ravel(), (rows, before[near].ravel())), shape=size)
+    return (diags_array(1.0 - deep) + carried).tocsr()
 
 
 def _seen(skin: Surface) -> Bools:

@@ -39,6 +39,11 @@ class Lips:
         known = all(k in self.face.skin.points for row in GUIDES for k in row)
         return known and 1 not in labels.sealed and all(np.any(labels.values == k) for k in (1, 2))
 
+    @property
+    def edges_at_rest(self) -> tuple[Floats, Floats]:
+        """The edges of the upper and of the lower lip, (s, 3) each, slice by slice."""
+        return self._lines(np.zeros_like(self.face.skin.vertices))[1]
+
     def in_contact(self, skin: Floats, gaps: bool) -> Floats:
         """Skin offsets (n, 3), mesh units, with lips that do not run through each other more than at rest.
 
@@ -110,7 +115,7 @@ class Lips:
 
     @cached_property
     def _gap_at_rest(self) -> Floats:
-        _, (upper, lower) = self._lines(np.zeros_like(self.face.skin.vertices))
+        upper, lower = self.edges_at_rest
         gap: Floats = upper[:, 1] - lower[:, 1]
         return gap
 

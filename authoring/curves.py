@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from authoring.bumps import Place, bumps
+from authoring.contact import Lips
 from cloning.prepare import PreparedFace
 from cloning.rims import eyes
 from fba.arrays import Bools, Floats
@@ -26,6 +27,12 @@ LIPS = (
 BROWS = (("4.6", "4.4", "4.2"), ("4.1", "4.3", "4.5"))
 """Feature points along the contours of the lips and along the brows, from the subject's right to the left."""
 
+CORNERS = ((("8.6", "8.8"), "8.4"), (("8.5", "8.7"), "8.3"))
+"""The feature points before each outer corner, and the corner."""
+
+BEYOND = {0.4: 1.05, 0.8: 0.95}
+"""Where the cheek goes along beyond a corner, in lengths of the lip's last part, and how far."""
+
 PARTS = (0.25, 0.5, 0.75)
 """Where places lie between two feature points."""
 
@@ -36,6 +43,9 @@ radius of 0.45, about a cheek's."""
 RIM_STEP = 6
 """One place for so many slices of an eye: 8 a lid."""
 
+CONTACT = slice(2, None, 3)
+"""The slices of the line of contact that are kept together: 26 of 80, the same on both sides."""
+
 OFF = 0.08
 """A place farther from the curve than this, in eye separations, is on other skin and left out."""
 
@@ -43,6 +53,55 @@ OFF = 0.08
 def lip_places(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
     """Places along all contours of the lips, where the feature points' weights (0 if absent) are blended."""
     return _blended(face, LIPS, values)
+
+
+def shut_lip_places(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
+    """Places along all contours of the lips, and the line of contact: what touches there goes together."""
+    return [*lip_places(face, values), *contact_places(face)]
+
+
+def corner_places(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
+    """Places beyond the corners of the outer lips, as far as the lip's last part is long: the cheek goes along."""
+    surface, at = face.skin, face.skin.positions
+    found = []
+    for before, corner in CORNERS:
+        value = values.get(corner, 0.0)
+        ends = [at[k] for k in before if k in surface.points]
+        if corner not in surface.points or not ends or not value:
+            continue
+        way = at[corner] - np.mean(ends, axis=0)
+        near = np.linalg.norm(surface.vertices - at[corner], axis=1) < 2.0 * float(np.linalg.norm(way))
+        spots = at[corner] + np.outer(list(BEYOND), way)
+        found += _nearest(face, near, spots, value * np.array(list(BEYOND.values())))
+    return found
+
+
+def contact_places(face: PreparedFace) -> list[Place]:
+    """Pairs of places where the lips touch, the weight of the upper one less that of the lower one being 0."""
+    if face not in _CONTACT:
+        _CONTACT[face] = _contact_places(face)
+    return _CONTACT[face]
+
+
+_CONTACT: WeakKeyDictionary[PreparedFace, list[Place]] = WeakKeyDictionary()
+
+
+def _contact_places(face: PreparedFace) -> list[Place]:
+    lips = Lips(face)
+    if not lips.apart:
+        return []
+    labels = face.labels.values
+    found = []
+    for lip, edge in enumerate(lips.edges_at_rest):
+        spots = edge[CONTACT]
+        found.append(_nearest(face, labels == lip + 1, spots, np.zeros(len(spots))))
+    upper, lower = found
+    if len(upper) != len(lower):
+        return []
+    return [
+        Place(np.concatenate([a.vertices, b.vertices]), np.concatenate([a.weights, -b.weights]), 0.0)
+        for a, b in zip(upper, lower, strict=True)
+    ]
 
 
 def brow_places(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
@@ -110,11 +169,22 @@ def _along(face: PreparedFace, keys: Sequence[str], values: Sequence[float]) -> 
     side = maker.side(keys[len(keys) // 2])
     near = np.linalg.norm(surface.vertices[:, None] - knots[None], axis=2).min(axis=1) < 2.0 * np.ptp(knots[:, 0])
     spots, weights = [], []
-    for (a, b), (u, v) in zip(pairwise(knots), pairwise(values), strict=True):
+    for k, ((a, b), (u, v)) in enumerate(zip(pairwise(knots), pairwise(values), strict=True)):
         for part in PARTS:
             spots.append(line(a[0] + part * (b[0] - a[0])))
-            weights.append(u + (v - u) * part * part * (3.0 - 2.0 * part))
+            weights.append(u + (v - u) * _blend(part, k == 0, k == len(keys) - 2))
     return _nearest(face, side & near, np.array(spots), np.array(weights))
+
+
+def _blend(part: float, first: bool, last: bool) -> float:
+    """From 0 to 1, level at feature points but for the ends of a curve, where it does not bend.
+
+    >>> _blend(0.5, False, False), _blend(0.5, True, False), _blend(0.5, False, True)
+    (0.5, 0.6875, 0.3125)
+    """
+    if first:
+        return 1.0 - _blend(1.0 - part, False, True)
+    return part * part * ((3.0 - part) / 2.0 if last else 3.0 - 2.0 * part)
 
 
 def _nearest(face: PreparedFace, where: Bools, spots: Floats, values: Floats) -> list[Place]:

@@ -10,8 +10,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from authoring.bump_motion import BumpMotion
+from authoring.bumps import Place
 from authoring.construction import Construction
-from authoring.curves import lip_places
+from authoring.curves import contact_places, corner_places, lip_places, shut_lip_places
+from cloning.prepare import PreparedFace
 
 MOUTH = ("8.3", "8.4")
 HEIGHTS = (-600, -300, 300, 600)
@@ -24,19 +26,33 @@ INNER, OUTER = 0.6, 0.55
 PUSH = 0.6
 """A lip is pushed as a whole; its corners hardly go along."""
 
-STRETCH, RAISE = 1.6, 0.9
+STRETCH, RAISE = 1.6, 1.2
 """A stretched corner pushes the whole cheek before it; a raised one only the skin between nose and jaw."""
 
 _OUTER = {6: "8.3", 7: "8.4", 12: "8.3", 13: "8.4"}
 _TIED = {53: 6, 54: 7, 59: 12, 60: 13}
 """The outer corner's FAP -> the inner one's, whose motion is the same."""
 
+
+def _stretched(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
+    return [*contact_places(face), *corner_places(face, values)]
+
+
+def _raised(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
+    return [*shut_lip_places(face, values), *corner_places(face, values)]
+
+
+_INNER = BumpMotion(4, HEIGHTS, MOUTH, INNER, carries=True, shape=lip_places)
+_OUTER_LIP = BumpMotion(51, HEIGHTS, MOUTH, OUTER, carries=True, shape=shut_lip_places)
+_STRETCH = BumpMotion(6, HEIGHTS, MOUTH, STRETCH, slides=True, carries=True, shape=_stretched)
+_RAISE = BumpMotion(12, HEIGHTS, MOUTH, RAISE, slides=True, carries=True, shape=_raised)
+
 _MOTIONS = (
-    *(BumpMotion(k, HEIGHTS, MOUTH, INNER, shape=lip_places) for k in (4, 5, 8, 9, 10, 11)),
-    *(BumpMotion(k, HEIGHTS, MOUTH, OUTER, shape=lip_places) for k in (51, 52, 55, 56, 57, 58)),
+    *(replace(_INNER, fap_id=k) for k in (4, 5, 8, 9, 10, 11)),
+    *(replace(_OUTER_LIP, fap_id=k) for k in (51, 52, 55, 56, 57, 58)),
     *(BumpMotion(k, DEPTHS, MOUTH, PUSH) for k in (16, 17)),
-    *(BumpMotion(k, HEIGHTS, MOUTH, STRETCH, (_OUTER[k],), slides=True, carries=True) for k in (6, 7)),
-    *(BumpMotion(k, HEIGHTS, MOUTH, RAISE, (_OUTER[k],), slides=True, shape=lip_places) for k in (12, 13)),
+    *(replace(_STRETCH, fap_id=k, tied=(_OUTER[k],)) for k in (6, 7)),
+    *(replace(_RAISE, fap_id=k, tied=(_OUTER[k],)) for k in (12, 13)),
 )
 
 _OWN = {m.fap_id: m.construction for m in _MOTIONS}
