@@ -20,6 +20,12 @@ SKIN, LIP, MOUTH = range(3)
 LIP_DEPTH = 0.8
 """How far the lips' colour goes into the mouth, in lip thicknesses."""
 
+ROUNDED = 2.2
+"""A lip's front is at most this many times as long, from contour to contour, as the straight way."""
+
+OUTLINE = 0.004
+"""How far beyond the contour, in ES0, a vertex still counts as on it: a quarter of a small edge."""
+
 CONTOURS = {
     "upper": (("2.7", "2.2", "2.6"), ("8.6", "8.1", "8.5")),
     "lower": (("2.9", "2.3", "2.8"), ("8.8", "8.2", "8.7")),
@@ -58,9 +64,17 @@ class Lips:
         width = [float(np.linalg.norm(p[a] - p[b])) for a, b in zip(*CONTOURS[name], strict=True)]
         x = [p["8.4"][0], *(p[k][0] for k in CONTOURS[name][0]), p["8.3"][0]]
         thick = np.interp(self._skin[:, 0], x, [0.3 * width[0], *width, 0.3 * width[2]])
-        within = (inner + outer <= 1.35 * thick) | ((outer > inner) & (inner <= LIP_DEPTH * thick))
+        front = self._within_outline(name) & (inner + outer <= ROUNDED * thick)
+        within = front | ((outer > inner) & (inner <= LIP_DEPTH * thick))
         lip: Bools = within & self._side(name)
         return lip
+
+    def _within_outline(self, name: str) -> Bools:
+        """Vertices (n,) on the mouth's side of the outer contour, as seen from the front."""
+        curve = np.array([self.head.positions[k] for k in CURVES[name][1]])
+        height = _through(np.clip(self._skin[:, 0], curve[0, 0], curve[-1, 0]), curve[:, 0], curve[:, 1])
+        sign = 1.0 if name == "upper" else -1.0
+        return np.asarray(sign * (self._skin[:, 1] - height) <= OUTLINE * self.head.fapu.es0)
 
     @property
     def _skin(self) -> Floats:

@@ -16,11 +16,13 @@ from samples.build.geodesic import smoothstep
 from samples.build.head import Head
 from samples.build.surface import nearest_facing
 
-LIP_GAP = -2.0 / 1024.0
-"""Gap between the lips, in MNS0: they overlap by a hair (.04 mm), so that no light falls through
+LIP_GAP = -6.0 / 1024.0
+"""Gap between the lips, in MNS0: they overlap by a hair (.12 mm), so that no light falls through
 where the edges of two lips with different vertices meet."""
 LIP_REACH = 0.17
 """How far from the line of contact a lip follows the correction, in ES0."""
+DEPTH_MEAN = 8
+"""Slices to both sides whose mean is taken: the edge of a flat lip jumps in depth from vertex to vertex."""
 PASSES = 6
 SOFT_PASSES = 16
 CORNER = 0.15
@@ -49,7 +51,7 @@ def neutral(head: Head, opening: float, show: float = 0.0) -> Head:
     head = _lids(replace(head, placed={**head.placed, **lid_points(head)}), opening)
     if head.fairing is not None:
         for _ in range(SOFT_PASSES):
-            head = head.moved({"skin": head.fairing.spread(close_lips(head))})
+            head = head.moved({"skin": head.fairing.spread(close_lips(head) + meet_in_depth(head))})
     for _ in range(PASSES):
         head = head.moved({"skin": close_lips(head)})
     head = replace(head, placed={**head.placed, **lip_points(head)})
@@ -95,25 +97,48 @@ def close_lips(head: Head) -> Floats:
 
     On a finer skin the corners keep their height, and the motion fades beyond them instead of ending there.
     """
-    p, fapu, soft = head.positions, head.fapu, head.fairing is not None
-    skin = head.parts["skin"]
-    ends = [head.points[k].vertices[0] for k in ("2.5", "2.4")]
-    span = np.linspace(skin[ends[0], 0], skin[ends[1], 0], 161)[1:-1]
-    sides = {name: side_mask(head, edge) for name, edge in LIPS.items()}
-    lines = {name: edge_line(head, edge, sides[name], span).points for name, edge in LIPS.items()}
+    p, soft = head.positions, head.fairing is not None
+    span, lines = _lip_edges(head)
     level = np.full(span.size, 0.5 * (p["2.4"][1] + p["2.5"][1]))
     if soft:
         half_way = 0.5 * (lines["upper"][:, 1] + lines["lower"][:, 1])
         level = half_way + smoothstep((1.0 - np.abs(span) / span[-1]) / CORNER) * (level - half_way)
+    half = 0.5 * LIP_GAP * head.fapu.mns0
+    shifts = {name: level + edge.sign * half - lines[name][:, 1] for name, edge in LIPS.items()}
+    return _follow(head, span, lines, shifts, 1)
+
+
+def meet_in_depth(head: Head) -> Floats:
+    """Offsets (n, 3) of the skin that bring the edges of both lips half-way to each other in depth.
+
+    Lips that touch one behind the other look closed from the front, but let light through seen from below.
+    """
+    span, lines = _lip_edges(head)
+    apart = lines["upper"][:, 2] - lines["lower"][:, 2]
+    even = np.convolve(np.pad(apart, DEPTH_MEAN, mode="edge"), np.full(2 * DEPTH_MEAN + 1, 1.0), "valid")
+    half = 0.5 * even / (2 * DEPTH_MEAN + 1)
+    return _follow(head, span, lines, {"upper": -half, "lower": half}, 2)
+
+
+def _lip_edges(head: Head) -> tuple[Floats, dict[str, Floats]]:
+    """x of slices from corner to corner, and the edges of both lips there, (s, 3)."""
+    skin = head.parts["skin"]
+    ends = [head.points[k].vertices[0] for k in ("2.5", "2.4")]
+    span = np.linspace(skin[ends[0], 0], skin[ends[1], 0], 161)[1:-1]
+    return span, {name: edge_line(head, edge, side_mask(head, edge), span).points for name, edge in LIPS.items()}
+
+
+def _follow(head: Head, span: Floats, lines: dict[str, Floats], shifts: dict[str, Floats], axis: int) -> Floats:
+    """Offsets (n, 3) of the skin along an axis when the edges of the lips are shifted; they fade with the distance."""
+    skin, soft = head.parts["skin"], head.fairing is not None
     offsets = np.zeros_like(skin)
     for name, edge in LIPS.items():
-        side, line = sides[name], lines[name]
-        shift = level + edge.sign * 0.5 * LIP_GAP * fapu.mns0 - line[:, 1]
+        side = side_mask(head, edge)
         x = skin[side, 0]
-        place = np.column_stack([np.clip(x, span[0], span[-1]) if soft else x, *_along(x, span, line)])
-        away = np.linalg.norm(skin[side] - place, axis=1) / (LIP_REACH * fapu.es0)
+        place = np.column_stack([np.clip(x, span[0], span[-1]) if soft else x, *_along(x, span, lines[name])])
+        away = np.linalg.norm(skin[side] - place, axis=1) / (LIP_REACH * head.fapu.es0)
         beyond = {} if soft else {"left": 0.0, "right": 0.0}
-        offsets[side, 1] = np.interp(x, span, shift, **beyond) * (1.0 - smoothstep(away))
+        offsets[side, axis] = np.interp(x, span, shifts[name], **beyond) * (1.0 - smoothstep(away))
     return offsets
 
 
