@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from authoring.bump_motion import BumpMotion
 from authoring.bumps import Place
 from authoring.construction import Construction, Offsets
-from authoring.curves import cap_places, rim_places, shut_lip_places
+from authoring.curves import dome_places, rim_places, shut_lip_places
 from cloning.prepare import PreparedFace
 
 SUCK_BORDERS, PUFF_BORDERS = (-900, -300), (300, 900)
@@ -20,8 +20,8 @@ PUFF, LIFT = 1.6, 2.2
 _EYES = (("3.7", "3.11"), ("3.8", "3.12"))
 
 
-def _cap(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
-    return [*cap_places(face, values), *shut_lip_places(face, values)]
+def _dome(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
+    return [*dome_places(face, values), *shut_lip_places(face, values)]
 
 
 def _rims(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
@@ -53,8 +53,8 @@ class Puff:
 def _puff(fap_id: int) -> Puff:
     eye = _EYES[(fap_id + 1) % 2]
     return Puff(
-        BumpMotion(fap_id, PUFF_BORDERS, eye, PUFF, bulges=True, carries=True, shape=_cap),
-        BumpMotion(fap_id, SUCK_BORDERS, eye, PUFF, carries=True, shape=shut_lip_places),
+        BumpMotion(fap_id, PUFF_BORDERS, eye, PUFF, bulges=True, carries=True, shape=_dome),
+        BumpMotion(fap_id, SUCK_BORDERS, eye, PUFF, carries=True, shape=_dome),
     )
 
 

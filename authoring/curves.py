@@ -36,9 +36,14 @@ BEYOND = {0.4: 1.05, 0.8: 0.95}
 PARTS = (0.25, 0.5, 0.75)
 """Where places lie between two feature points."""
 
-CAP, CAP_HEIGHT, AROUND = 0.15, 0.94, 8
-"""Radius of a cap in eye separations, the weight at its edge, and the number of places there: the top of a ball of a
-radius of 0.45, about a cheek's."""
+DOME = {0.15: 0.96, 0.3: 0.84}
+"""Radius in eye separations -> the height of a dome there: 0 at 0.75, from the cheekbone to the jaw."""
+
+AROUND = 8
+"""Places on each ring of a dome."""
+
+TOWARDS = 0.12
+"""Half the way from the cheek's feature point to the corner of the mouth: nearer to it the dome comes down."""
 
 RIM_STEP = 6
 """One place for so many slices of an eye: 8 a lid."""
@@ -118,20 +123,29 @@ def _blended(face: PreparedFace, curves: Sequence[Sequence[str]], values: Mappin
     return found
 
 
-def cap_places(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
-    """Places all around feature points, on a round cap of the height of their weights: no bump ends in a cone there."""
+def dome_places(face: PreparedFace, values: Mapping[str, float]) -> list[Place]:
+    """Places around feature points of a cheek, on a dome as wide as its soft part: no bump ends in a cone there.
+
+    The dome reaches away from the mouth, whose corner lies near and stays.
+    """
+    surface, at = face.skin, face.skin.positions
     found = []
     for key, value in values.items():
-        middle = face.skin.positions[key]
-        normal = (face.skin.point_matrix([key]) @ face.skin.normals)[0]
+        middle = at[key]
+        normal = (surface.point_matrix([key]) @ surface.normals)[0]
         normal /= max(float(np.linalg.norm(normal)), 1e-12)
         up = np.array([0.0, 1.0, 0.0]) - normal[1] * normal
         up /= max(float(np.linalg.norm(up)), 1e-12)
         aside = np.cross(up, normal)
-        near = np.linalg.norm(face.skin.vertices - middle, axis=1) < 3.0 * CAP
+        corner = min((at[k] for _, k in CORNERS), key=lambda place: float(np.linalg.norm(place - middle)))
+        away = (middle - corner) / max(float(np.linalg.norm(middle - corner)), 1e-12)
+        near = (np.linalg.norm(surface.vertices - middle, axis=1) < 3.0 * max(DOME)) & bumps(face).side(key)
         angles = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
-        spots = middle + CAP * (np.cos(angles)[:, None] * up + np.sin(angles)[:, None] * aside)
-        found += _nearest(face, near & bumps(face).side(key), spots, np.full(AROUND, value * CAP_HEIGHT))
+        ways = np.cos(angles)[:, None] * up + np.sin(angles)[:, None] * aside
+        for radius, height in DOME.items():
+            free = radius * (ways @ away) > -TOWARDS
+            spots = middle + radius * ways[free]
+            found += _nearest(face, near, spots, np.full(len(spots), value * height))
     return found
 
 
