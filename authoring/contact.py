@@ -19,6 +19,10 @@ REACH = 0.17
 NEAR = 0.12
 """How far from the line through its feature points the edge of a lip may lie, in eye separations."""
 
+ODD, ODD_AT_LEAST = 3.0, 0.01
+"""A slice in which the lips at rest are this many times as far apart as in the middle one, and by this more (eye
+separations), was measured elsewhere: near the corners of the mouth the lips are one skin."""
+
 SLICES = 80
 PASSES = 6
 
@@ -60,20 +64,27 @@ class Lips:
         for _ in range(PASSES):
             span, lines = self._lines(offsets)
             gap = lines[0][:, 1] - lines[1][:, 1]
-            wrong = least - gap
+            wrong = self._between(least - gap)
             half = 0.5 * (wrong if gaps else np.maximum(wrong, 0.0))
-            if not np.nanmax(np.abs(half), initial=0.0) > 1e-6:
+            if not np.abs(half).max() > 1e-6:
                 break
             offsets = offsets + self._shift(0, offsets, span, lines[0], half)
             offsets = offsets + self._shift(1, offsets, span, lines[1], -half)
         done: Floats = offsets * es0
         return done
 
+    def _between(self, values: Floats) -> Floats:
+        """Values (s,) of the slices, with those that were not measured between the lips' edges taken from beside."""
+        rest = self._gap_at_rest
+        used = rest < ODD * max(float(np.median(rest)), 0.0) + ODD_AT_LEAST
+        row = np.arange(len(values))
+        filled: Floats = np.interp(row, row[used], values[used]) if used.any() else np.zeros(len(values))
+        return filled
+
     def _shift(self, lip: int, offsets: Floats, span: Floats, line: Floats, lift: Floats) -> Floats:
         """Offsets along y that lift a lip's edge slice by slice and fade away from it."""
         side = self._side(lip)
         moved = self.face.skin.vertices[side] + offsets[side]
-        lift = np.nan_to_num(lift)
         place = np.column_stack([np.interp(moved[:, 0], span, line[:, k]) for k in (1, 2)])
         away = np.clip(np.linalg.norm(moved[:, 1:] - place, axis=1) / REACH, 0.0, 1.0)
         out = np.zeros_like(offsets)

@@ -88,7 +88,7 @@ class Fitting:
         raw : the motion as the shapes have it.
         skin : (n, 3) final offsets of the joined skin, mesh units.
         """
-        skin = self.off_eyeballs(skin)
+        skin = self.face.skin.join(self.seamless(self.face.skin.split(self.off_eyeballs(skin))))
         quiet = np.linalg.norm(skin, axis=1) < NOISE * self.face.fapu.es0
         skin = np.where(quiet[:, None], 0.0, skin)
         change = skin_offsets(self.face, (skin - self.face.skin.join(raw)) / self.face.fapu.es0)
@@ -96,6 +96,14 @@ class Fitting:
         # Rounding of the sum shall not move skin that rests.
         out.update(self.face.skin.split(skin))
         return {name: part for name, part in out.items() if part.any()}
+
+    def seamless(self, offsets: Offsets) -> Offsets:
+        """A motion in which the copies of a vertex along a seam go the same way."""
+        if not len(self.face.skin.links):
+            return offsets
+        skin = self.face.skin.join(offsets)
+        joined = self.face.skin.split(self.face.skin.seam_mean @ skin)
+        return {**offsets, **{name: part for name, part in joined.items() if part.any()}}
 
     def off_eyeballs(self, skin: Floats) -> Floats:
         """The skin (n, 3) pushed forward where it would get deeper into an eyeball than at rest; heights stay."""

@@ -202,7 +202,11 @@ class LowLevel:
         if entry.id not in self._made:
             self._made[entry.id] = construct(self.face, entry.id)
         motions, findings = self._made[entry.id]
-        rows = {m.value: (dict(m.offsets), Step(m.value, "constructed", {})) for m in motions if m.value * sign > 0}
+        rows = {
+            m.value: (self.maker.fitting.seamless(dict(m.offsets)), Step(m.value, "constructed", {}))
+            for m in motions
+            if m.value * sign > 0
+        }
         if rows:
             return rows
         reasons = [f.message.removeprefix(f"{entry.name} is ") for f in findings]
