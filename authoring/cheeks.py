@@ -12,7 +12,8 @@ from authoring.curves import dome_places, rim_places, shut_lip_places
 from cloning.prepare import PreparedFace
 
 SUCK_BORDERS, PUFF_BORDERS = (-900, -300), (300, 900)
-LIFT_BORDERS = (300, 600)
+LIFT_BORDERS = (75, 150, 300, 600)
+"""Close steps: the lower lid is pushed round the eyeball."""
 
 PUFF, LIFT = 1.6, 2.2
 """Reach in eye widths: a puffed cheek from the cheekbone to the jaw, a lifted one from the lower lid to the mouth."""

@@ -19,6 +19,10 @@ GIVES = 0.15
 FAR = 3.0
 """Skin that comes no nearer to the eyeball's middle than this, in radii, is not looked at."""
 
+BURIED = (-0.06, -0.02)
+"""The back of a lid that lies less deep in the eyeball at rest than the second clearance, in radii, gets no deeper;
+what is deeper than the first one may go where it likes, for nobody sees it."""
+
 BEHIND = -0.1
 """Skin farther behind the middle of the eyeball than this, in radii, is beside it and cannot come in front."""
 
@@ -27,7 +31,7 @@ def before_eyeballs(face: PreparedFace, field: Floats) -> Floats:
     """A field (n, 3) in eye separations, pushed forward where skin would sink into an eyeball.
 
     Height and width, which feature points around the eyes are measured in, stay as they are. Skin keeps most of the
-    clearance that it has at rest; what lies inside the eyeball at rest may stay there.
+    clearance that it has at rest; what lies inside the eyeball at rest may stay there, but gets hardly deeper.
     """
     if face not in _BALLS:
         _BALLS[face] = balls(face)
@@ -45,8 +49,9 @@ def before_eyeballs(face: PreparedFace, field: Floats) -> Floats:
         needed = ball.radius(place) * (1.0 + keep)
         flat = place[:, 0] ** 2 + place[:, 1] ** 2
         front = np.sqrt(np.maximum(needed**2 - flat, 0.0))
-        lifted = np.where((clear > 0.0) & (flat < needed**2), np.maximum(front - place[:, 2], 0.0), 0.0)
-        out[moving[near], 2] += lifted / es0
+        lifted = np.where(flat < needed**2, np.maximum(front - place[:, 2], 0.0), 0.0)
+        held = np.clip((clear - BURIED[0]) / (BURIED[1] - BURIED[0]), 0.0, 1.0)
+        out[moving[near], 2] += held * lifted / es0
     return out
 
 
