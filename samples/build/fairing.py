@@ -16,9 +16,9 @@ from samples.build.geodesic import distances
 if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU
 
-AT_RIM = 0.04
-BEYOND = 0.08
-"""Detail smaller than about six times this (ES0) fades; as wide as MakeHuman's polygons are at rims and on cheeks."""
+AT_LIPS, AT_LIDS, BEYOND = 0.04, 0.06, 0.08
+"""Detail smaller than about six times this (ES0) fades: at the lips and on the cheeks as wide as MakeHuman's polygons
+are; at the lids wider, because they fold when the eye closes."""
 NEAR, FAR = 0.05, 0.2
 """Distances from the rims (ES0) between which the first width becomes the second."""
 STILL = 3e-4
@@ -32,12 +32,13 @@ class Fairing:
     """Least bending next to the given field: ``(M + L s^4 M^-1 L) smooth = M field`` with cotangent weights.
 
     mesh : the skin.
-    rims : feature points along lips and lids, near which the field keeps more detail.
+    lips, lids : feature points along them, near which the field keeps more detail.
     es0 : eye separation in the mesh's unit.
     """
 
     mesh: PolyMesh
-    rims: tuple[FeaturePoint, ...]
+    lips: tuple[FeaturePoint, ...]
+    lids: tuple[FeaturePoint, ...]
     es0: float
 
     def spread(self, field: Floats) -> Floats:
@@ -76,6 +77,9 @@ class Fairing:
 
     @cached_property
     def _widths(self) -> Floats:
-        away = distances(self.mesh, list(self.rims)).min(axis=0) / self.es0
-        widths: Floats = AT_RIM + (BEYOND - AT_RIM) * np.clip((away - NEAR) / (FAR - NEAR), 0.0, 1.0)
+        widths = np.full(self.mesh.vertex_count, BEYOND)
+        for rim, least in ((self.lips, AT_LIPS), (self.lids, AT_LIDS)):
+            away = distances(self.mesh, list(rim)).min(axis=0) / self.es0
+            wide = least + (BEYOND - least) * np.clip((away - NEAR) / (FAR - NEAR), 0.0, 1.0)
+            widths = np.minimum(widths, wide)
         return widths

@@ -24,8 +24,8 @@ LONG = 0.06
 """... if they have a longer edge than this (ES0), or belong to the lips; those around the lids are small already."""
 SOCKET = 0.99
 """Skin nearer to the centre of an eyeball than this (radii) lines the socket and stays coarse."""
-RIMS = ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9", *(f"8.{k}" for k in range(1, 11)))
-RIMS += ("3.1", "3.2", "3.3", "3.4", "3.7", "3.8", "3.11", "3.12")
+LIPS = ("2.2", "2.3", "2.4", "2.5", "2.6", "2.7", "2.8", "2.9", *(f"8.{k}" for k in range(1, 11)))
+LIDS = ("3.1", "3.2", "3.3", "3.4", "3.7", "3.8", "3.11", "3.12")
 """Feature points along the lips and the lids."""
 EYE_SEGMENTS = 32
 
@@ -41,7 +41,8 @@ def fine(head: Head) -> Head:
     finer = replace(head, crop=HeadCrop(shapes), eye_segments=EYE_SEGMENTS)
     placed = _points(head, finer)
     skin = shapes["skin"].mesh.with_vertices(finer.parts["skin"])
-    fairing = Fairing(skin, tuple(placed[key] for key in RIMS), head.fapu.es0)
+    lips, lids = (tuple(placed[key] for key in rim) for rim in (LIPS, LIDS))
+    fairing = Fairing(skin, lips, lids, head.fapu.es0)
     return replace(finer, placed=placed, fairing=fairing)
 
 
