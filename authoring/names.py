@@ -71,8 +71,10 @@ _KITS: dict[str, str] = {
     "mouth-depression": "mouthFrown",
     "mouth-open": "jawOpen",
     "mouth-pursing": "mouthPucker",
-    "mouth-eversion": "mouthFunnel",
-    "mouth-retraction": "mouthStretch",
+    "mouth-protusion": "mouthFunnel",
+    "mouth-eversion": "mouthShrugLower",
+    "mouth-retraction": "mouthDimple",
+    "mouth-depression-retraction": "mouthLowerDown",
     "mouth-elevation": "mouthUpperUp",
     "mouth-compression": "mouthPress",
     "nose-left-dilatation": "noseWideLeft",
@@ -95,7 +97,7 @@ _KITS: dict[str, str] = {
     "Lid tightener": "eyeSquint",
     "Upper lid raiser": "eyeWide",
 }
-"""Whole names of other kits -> unit; a unit without a side is split between left and right."""
+"""Whole names of other kits -> the unit that moves the feature points alike; one without a side is split in halves."""
 
 _PRESETS: dict[str, Meaning] = {
     **{v.name: Meaning("viseme", v.id) for v in VISEMES if len(v.name) == 2},
