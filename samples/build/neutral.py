@@ -16,9 +16,9 @@ from samples.build.geodesic import smoothstep
 from samples.build.head import Head
 from samples.build.surface import nearest_facing
 
-LIP_GAP = -6.0 / 1024.0
-"""Gap between the lips, in MNS0: they overlap by a hair (.12 mm), so that no light falls through
-where the edges of two lips with different vertices meet."""
+COARSE_GAP, FINE_GAP = -2.0 / 1024.0, -6.0 / 1024.0
+"""Gap between the lips, in MNS0, on MakeHuman's own skin and on a finer one: they overlap by a hair (.04 and .12 mm), so
+that no light falls through where the edges of two lips with different vertices meet."""
 LIP_REACH = 0.17
 """How far from the line of contact a lip follows the correction, in ES0."""
 DEPTH_MEAN = 8
@@ -103,7 +103,7 @@ def close_lips(head: Head) -> Floats:
     if soft:
         half_way = 0.5 * (lines["upper"][:, 1] + lines["lower"][:, 1])
         level = half_way + smoothstep((1.0 - np.abs(span) / span[-1]) / CORNER) * (level - half_way)
-    half = 0.5 * LIP_GAP * head.fapu.mns0
+    half = 0.5 * (FINE_GAP if soft else COARSE_GAP) * head.fapu.mns0
     shifts = {name: level + edge.sign * half - lines[name][:, 1] for name, edge in LIPS.items()}
     return _follow(head, span, lines, shifts, 1)
 
