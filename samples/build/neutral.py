@@ -17,8 +17,8 @@ from samples.build.head import Head
 from samples.build.surface import nearest_facing
 
 COARSE_GAP, FINE_GAP = -2.0 / 1024.0, -6.0 / 1024.0
-"""Gap between the lips, in MNS0, on MakeHuman's own skin and on a finer one: they overlap by a hair (.04 and .12 mm), so
-that no light falls through where the edges of two lips with different vertices meet."""
+"""Gap between the lips, in MNS0, on MakeHuman's own skin and on a finer one: they overlap by a hair (.04 and .12 mm),
+so that no light falls through where the edges of two lips with different vertices meet."""
 LIP_REACH = 0.17
 """How far from the line of contact a lip follows the correction, in ES0."""
 DEPTH_MEAN = 8
