@@ -25,10 +25,9 @@ BEHIND = (0.2, 0.6)
 """Hidden skin up to the first distance behind the outer one (eye separations) goes all the way along, beyond the
 second not at all: a cheek is about 0.25 thick."""
 
-
-DEEP = (0.03, 0.15)
-"""Hidden skin nearer than the first distance to what can be seen, along the skin, moves with it as one: the red of the
-lips behind their contact, the rims of lids and nostrils. Beyond the second it is lining."""
+DEEP = (0.0, 0.15)
+"""From the edge of what can be seen, along the skin, hidden skin passes over from moving with it as one, as the red of
+the lips behind their contact does, to lining, which it is wholly beyond the second distance."""
 
 VIEWS = 7
 """Directions that the face is seen from: ahead, above, below, and half a radian to both sides."""

@@ -50,7 +50,7 @@ _RAISE = BumpMotion(12, HEIGHTS, MOUTH, RAISE, slides=True, carries=True, shape=
 _MOTIONS = (
     *(replace(_INNER, fap_id=k) for k in (4, 5, 8, 9, 10, 11)),
     *(replace(_OUTER_LIP, fap_id=k) for k in (51, 52, 55, 56, 57, 58)),
-    *(BumpMotion(k, DEPTHS, MOUTH, PUSH) for k in (16, 17)),
+    *(BumpMotion(k, DEPTHS, MOUTH, PUSH, carries=True) for k in (16, 17)),
     *(replace(_STRETCH, fap_id=k, tied=(_OUTER[k],)) for k in (6, 7)),
     *(replace(_RAISE, fap_id=k, tied=(_OUTER[k],)) for k in (12, 13)),
 )

@@ -62,6 +62,7 @@ class FapQuality:
     parted : seam vertices whose copies come apart, at the limit too.
     penetration : percent of the skin vertices on the front of the eyeballs that get into them.
     asymmetry : relative L2 difference from the mirror image of the other side's FAP.
+    through : vertices of the lining of mouth, cheeks and nose that come before the skin.
     """
 
     fap_id: int
@@ -78,6 +79,7 @@ class FapQuality:
     parted: int | None
     penetration: float | None
     asymmetry: float | None
+    through: int | None = None
 
     @property
     def high_level(self) -> bool:
@@ -153,6 +155,9 @@ class FapQuality:
         if self.parted is not None:
             text = f"{self.parted} vertices come apart along a seam"
             yield "fap-seam", text, 1.0 + self.parted if self.parted else 0.0
+        if self.through is not None:
+            text = f"{self.through} vertices of the lining come through the skin before it"
+            yield "fap-lining", text, 1.0 + self.through if self.through else 0.0
         if self.penetration is not None:
             text = (
                 f"{self.penetration:.2f} % of the skin before the eyeballs gets into them, at most {PENETRATION_MUST}"

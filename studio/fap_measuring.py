@@ -9,6 +9,7 @@ import numpy as np
 
 from cloning.eyeballs import Ball, balls
 from cloning.labels import label
+from cloning.lining import coming_through, lining
 from cloning.prepare import PreparedFace
 from cloning.rigid import fit_rigid
 from cloning.surface import Surface, build_surface
@@ -20,7 +21,7 @@ from fat.fap_quality import FapQuality, independent_motion, mirrored, parted, pe
 from fat.quality import asymmetry, flips, mirror_map
 from fat.tables import FaceDefTable
 from fba.amplitudes import amplitudes
-from fba.arrays import Floats, Ints
+from fba.arrays import Bools, Floats, Ints
 from fba.errors import LandmarkError, MeshError
 from fba.faps import EXPRESSION_FAP, VISEME_FAP, fap
 from fba.high_level import BLEND_MAX
@@ -57,12 +58,18 @@ class _Skin:
 
     Attributes
     ----------
-    hidden : (e, 2) edges with an end that cannot be seen on the neutral face.
+    seen : (n,) what can be seen on the neutral face.
+    hidden : (e, 2) edges with an end that cannot.
+    labels : (n,) lips and lids, see `cloning.labels`.
+    lining : (m,) vertices that line the inside, see `cloning.lining`.
     linear : shape name -> (3, 3) from its local directions to the world's.
     """
 
     surface: Surface
+    seen: Bools
     hidden: Ints
+    labels: Ints
+    lining: Ints
     linear: Mapping[str, Floats]
 
     def offsets(self, face: AnimatableFace, pose: Pose, es0: float) -> Floats:
@@ -126,6 +133,7 @@ class _Measurer:
             flips_at_limit=flips(surface.vertices, surface.triangles, wide),
             stretch=stretch(surface.vertices, self.skin.hidden, near),
             parted=parted(surface.links, wide),
+            through=len(coming_through(surface, self.skin.seen, self.skin.labels, self.skin.lining, near)),
         )
 
     def _pose(self, fap_id: int, select: int, value: int) -> Pose:
@@ -189,11 +197,13 @@ def _skin(face: AnimatableFace) -> _Skin | None:
         whole = build_surface(face.scene, face.feature_points, [s.name for s in face.scene.shapes], face.fapu.es0)
     except LandmarkError:
         return None
-    seen = whole.split(visible(whole).astype(np.float64))
-    hidden = np.concatenate([seen[name] == 0.0 for name in names])
+    shown = whole.split(visible(whole).astype(np.float64))
+    seen = np.concatenate([shown[name] > 0.0 for name in names])
     edges = surface.edges
     linear = {name: face.scene.world_matrix(name)[:3, :3] for name in names}
-    return _Skin(surface, edges[hidden[edges].any(axis=1)], linear)
+    labels = label(surface).values
+    hidden = edges[~seen[edges].all(axis=1)]
+    return _Skin(surface, seen, hidden, labels, lining(surface, seen, labels), linear)
 
 
 def _eyeballs(face: AnimatableFace, skin: _Skin | None) -> list[tuple[Ball, list[str]]]:

@@ -27,6 +27,7 @@ COLUMNS = (
     ">flips there",
     ">stretch",
     ">seams",
+    ">lining",
     ">in eyes",
     ">mirror",
     "",
@@ -89,6 +90,7 @@ def _print(result: CheckResult, worst: bool) -> None:
         table("", COLUMNS, [_cells(row, beside) for row, beside in rows], out)
         out.print(
             "flips: % of moving triangles; stretch: of hidden skin, times; seams: vertices that come apart; "
+            "lining: vertices of hidden skin that come before the skin; "
             "in eyes: % of skin before the eyeballs; mirror: difference of the sides"
         )
         if result.source_quality is not None:
@@ -122,6 +124,7 @@ def _cells(row: FapQuality, beside: FapQuality | None) -> tuple[str, ...]:
         cell("flips_at_limit", ".2f"),
         cell("stretch", ".2f"),
         "-" if row.parted is None else str(row.parted),
+        "-" if row.through is None else str(row.through),
         cell("penetration", ".2f"),
         cell("asymmetry", ".1f", 100.0) + (" %" if row.asymmetry is not None else ""),
         "" if row.passed else "FAIL",

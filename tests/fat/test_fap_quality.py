@@ -98,6 +98,7 @@ def test_what_carries_everything_has_no_cross_talk() -> None:
         ({"flips_at_limit": 0.6}, "fap-flips-at-limit"),
         ({"stretch": 5.5}, "fap-tear"),
         ({"parted": 1}, "fap-seam"),
+        ({"through": 1}, "fap-lining"),
         ({"penetration": 0.3}, "fap-penetration"),
     ],
 )
