@@ -16,6 +16,13 @@ LAYER = 0.08
 GIVES = 0.15
 """Thicker skin, of brows and cheeks, gives way to this share of what it has above the layer."""
 
+EASE = 0.15
+"""Radii over which skin begins to give way: where it came into contact all at once, a crease would show."""
+
+BESIDE = (0.96, 1.0)
+"""Skin so far beside the middle, in parts of the ball with its clearance, passes over to skin that is beside it: the
+corners of the lids are nearer, at 0.85."""
+
 FAR = 3.0
 """Skin that comes no nearer to the eyeball's middle than this, in radii, is not looked at."""
 
@@ -46,13 +53,38 @@ def before_eyeballs(face: PreparedFace, field: Floats) -> Floats:
         local, place = local[near], place[near]
         clear = ball.clearance(local)
         keep = np.minimum(clear, LAYER) + GIVES * np.clip(clear - LAYER, 0.0, 1.0)
-        needed = ball.radius(place) * (1.0 + keep)
-        flat = place[:, 0] ** 2 + place[:, 1] ** 2
-        front = np.sqrt(np.maximum(needed**2 - flat, 0.0))
-        lifted = np.where(flat < needed**2, np.maximum(front - place[:, 2], 0.0), 0.0)
-        held = np.clip((clear - BURIED[0]) / (BURIED[1] - BURIED[0]), 0.0, 1.0)
+        (lacking, beside), (at_rest, _) = (_lacking(ball, spot, keep) for spot in (place, local))
+        width = np.clip(-at_rest, 0.0, EASE * size)
+        lifted = np.maximum(_soft(lacking, width) - _soft(np.minimum(at_rest, 0.0), width), 0.0)
+        held = _share(clear, BURIED) * (1.0 - _share(beside, BESIDE))
         out[moving[near], 2] += held * lifted / es0
     return out
+
+
+def _lacking(ball: Ball, spots: Floats, keep: Floats) -> tuple[Floats, Floats]:
+    """How far spots (m, 3) must go forward to be off the ball by a clearance (m,), and how far beside it they are.
+
+    Returns
+    -------
+    lacking : (m,) negative where nothing lacks.
+    beside : (m,) distance from the middle across the view; 1 at the edge of ball and clearance.
+    """
+    needed = ball.radius(spots) * (1.0 + keep)
+    flat = np.hypot(spots[:, 0], spots[:, 1])
+    lacking: Floats = np.sqrt(np.maximum(needed**2 - flat**2, 0.0)) - spots[:, 2]
+    return lacking, flat / needed
+
+
+def _share(value: Floats, ends: tuple[float, float]) -> Floats:
+    """From 0 at the first end to 1 at the second."""
+    share: Floats = np.clip((value - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
+    return share
+
+
+def _soft(value: Floats, width: Floats) -> Floats:
+    """The value above 0 and 0 below, without a kink: rounded over a width."""
+    rounded: Floats = 0.5 * (value + np.sqrt(value**2 + width**2))
+    return rounded
 
 
 _BALLS: WeakKeyDictionary[PreparedFace, list[Ball]] = WeakKeyDictionary()
