@@ -18,10 +18,11 @@ import numpy as np
 from authoring.construction import Construction, Offsets
 from authoring.riders import carried, in_mesh_units
 from authoring.spread import Spread, spread
+from authoring.unfold import unfold
 from cloning.eyeballs import Ball, balls
 from cloning.labels import OPPOSITE
 from cloning.prepare import PreparedFace
-from cloning.rims import EYES, Eye, eyes
+from cloning.rims import EYES, SLICES, Eye, eyes
 from cloning.surface import Surface
 from fba.arrays import Bools, Floats
 from fba.faps import fap
@@ -45,6 +46,16 @@ ANY = 1.0
 
 BESIDE = 0.1
 """Share of the way from the feature point to each corner over which the overlap grows."""
+
+CORNER = 0.35
+"""Unlabelled skin this near to the line between the ends of both rims, as a share of its length, is the corner."""
+
+SPARE = 0.18
+"""At the ends of the rims a closed lid leaves this share of the opening to the margin, which folds up there: skin
+that is pressed flat turns over ..."""
+
+NEAR_END = 0.1
+"""... fading over this share of the eye's width."""
 
 RIM = 0.02
 """So near to its rim, in eye separations, a lid goes along wholly."""
@@ -71,17 +82,6 @@ STILL_POINTS = (
 LAYER = 0.02
 """A lid clears the ball by no more than this, in radii; by less where it is nearer at rest."""
 
-FADES = 0.3
-"""Beyond the corners of the eye a turn fades over this share of the eye's width."""
-
-EVEN = 0.2
-"""Over this share of the eye's width the turn is evened out along x, in skin that follows less than AT_RIM."""
-
-AT_RIM = 0.75
-
-GRID = 256
-"""Places along x at which the turn is held."""
-
 SINKS = 0.6
 """A closed lid gives up this share of the distance by which its rim stands farther out than the other one, so that
 no slit opens between them from below."""
@@ -97,6 +97,20 @@ STEEPEST = 0.97
 
 
 @dataclass(frozen=True, eq=False)
+class Follow:
+    """How the skin follows a rim.
+
+    Attributes
+    ----------
+    shares : (n,) share of the rim's turn that is wanted of each vertex.
+    firmness : (n,) how firmly it holds that, as in `Spread`.
+    """
+
+    shares: Floats
+    firmness: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Lid:
     """One lid of a face that is ready to move.
 
@@ -104,11 +118,10 @@ class Lid:
     ----------
     eye, part : of `cloning.rims`; part 0 upper, 1 lower.
     ball : the eyeball.
-    slices : (s,) x of the rim, from corner to corner.
-    rims : (2, s) heights of the own and of the other rim over the middle of the ball; at the corners, where both are
-        one, the other one is taken from beside them, so that corners follow and blunt ones close as well.
+    slices : (s,) x of the rim, as far as both rims are apart.
+    rims : (2, s) heights of the own and of the other rim over the middle of the ball.
     reach : (2, s) distance of these rims from the axis through the middle of the ball.
-    closing, opening : (n,) share of the rim's turn that each vertex of the skin follows.
+    closing, opening : how the skin follows the rim.
     """
 
     face: PreparedFace
@@ -119,59 +132,52 @@ class Lid:
     slices: Floats
     rims: Floats
     reach: Floats
-    closing: Floats
-    opening: Floats
+    closing: Follow
+    opening: Follow
 
     def at(self, value: float) -> Offsets:
         """Offsets at a FAP value; the lid's feature point moves by exactly that."""
         face = self.face
-        share = self.closing if value > 0 else self.opening
-        scale = self._exact(share, value)
-        turned = self._turned(face.skin.vertices, share, value, scale)
+        turn = self._turn(self.closing if value > 0 else self.opening, value)
+        scale = self._exact(turn, value)
+        turned = self._turned(face.skin.vertices, turn, value, scale)
         skin = turned.copy()
         if value > 0:
             skin[self.eye.lids[self.part].vertices, 1] += self.eye.follow(self.part, skin, self._travel(value), ANY)
-        keep_clear(self.face, self.ball, skin)
+        keep_clear(face, self.ball, skin)
+        unfold(face.skin, skin)
+        keep_clear(face, self.ball, skin)
         riders = carried(face, skin - turned)
-        shares = carried(face, np.repeat(share[:, None], 3, axis=1))
+        turns = carried(face, np.repeat(turn[:, None], 3, axis=1))
         for name, rest in riders.items():
             places = face.scene.world_vertices(name) / face.fapu.es0
-            rest += self._turned(places, shares[name][:, 0], value, scale)
+            rest += self._turned(places, turns[name][:, 0], value, scale)
         return in_mesh_units(face, {**face.skin.split(skin), **riders})
 
     def angles(self, value: float) -> Floats:
         """(s,) angle about +x that takes the rim its share of the way to the other rim."""
         own, other = self.rims
-        goal = own + value / FAPU_DIVISOR * (other - own)
+        goal = own + value / FAPU_DIVISOR * self._ends(self.slices, value) * (other - own)
         sines = [np.arcsin(np.clip(y / self.reach[0], -STEEPEST, STEEPEST)) for y in (own, goal)]
         angles: Floats = sines[0] - sines[1]
         return angles
 
-    def _turn(self, x: Floats, share: Floats, value: float) -> Floats:
-        """(n,) angle of the whole lid for vertices at x: the rim's at the rim, evened out along x away from it."""
-        from scipy.ndimage import gaussian_filter1d
+    def _turn(self, follow: Follow, value: float) -> Floats:
+        """(n,) angle of the skin: the rim's at the rim, from there over the skin as a thin plate would bend."""
+        angles = self.angles(value)
+        most = angles[np.argmax(np.abs(angles))]
+        wanted = np.interp(self.face.skin.vertices[:, 0], self.slices, angles) / most
+        turn: Floats = most * _plate(self.face)(follow.shares * wanted, follow.firmness, SMOOTH)
+        return turn
 
-        first, last = self.slices[0], self.slices[-1]
-        fades = FADES * (last - first)
-        grid = np.linspace(first - 2.0 * fades, last + 2.0 * fades, GRID)
-        beyond = np.maximum(np.maximum(first - grid, grid - last), 0.0)
-        sharp = np.interp(grid, self.slices, self.angles(value)) * _smoothstep(1.0 - beyond / fades)
-        even = gaussian_filter1d(sharp, EVEN * (last - first) / (grid[1] - grid[0]), mode="constant")
-        at_rim = _smoothstep((share - AT_RIM) / (1.0 - AT_RIM))
-        angle: Floats = at_rim * np.interp(x, grid, sharp) + (1.0 - at_rim) * np.interp(x, grid, even)
-        return angle
-
-    def _turned(self, places: Floats, share: Floats, value: float, scale: tuple[float, float]) -> Floats:
-        """Offsets (n, 3) of places that follow a share of the turn of the rim at their x."""
-        turn = scale[0] * share * self._turn(places[:, 0], share, value)
-        first, last = self.slices[0], self.slices[-1]
-        beyond = np.maximum(np.maximum(first - places[:, 0], places[:, 0] - last), 0.0)
-        follows = share * _smoothstep(1.0 - beyond / (FADES * (last - first)))
+    def _turned(self, places: Floats, turn: Floats, value: float, scale: tuple[float, float]) -> Floats:
+        """Offsets (n, 3) of places that turn by an angle (n,) times a scale, and are lifted besides."""
+        follows = turn / np.abs(self.angles(value)).max()
         _, y, z = (places - self.middle).T
-        nearer = 1.0 - follows * np.interp(places[:, 0], self.slices, self._sink(value)) / np.hypot(y, z)
-        cosine, sine = nearer * np.cos(turn) - 1.0, nearer * np.sin(turn)
+        nearer = 1.0 - np.abs(follows) * np.interp(places[:, 0], self.slices, self._sink(value)) / np.hypot(y, z)
+        cosine, sine = nearer * np.cos(scale[0] * turn) - 1.0, nearer * np.sin(scale[0] * turn)
         return np.column_stack(
-            [np.zeros(len(places)), cosine * y - sine * z + scale[1] * follows, sine * y + cosine * z]
+            [np.zeros(len(places)), cosine * y - sine * z + scale[1] * np.abs(follows), sine * y + cosine * z]
         )
 
     def _sink(self, value: float) -> Floats:
@@ -179,7 +185,7 @@ class Lid:
         farther: Floats = np.maximum(self.reach[0] - self.reach[1], 0.0)
         return SINKS * max(value, 0.0) / FAPU_DIVISOR * farther
 
-    def _exact(self, share: Floats, value: float) -> tuple[float, float]:
+    def _exact(self, turn: Floats, value: float) -> tuple[float, float]:
         """The scale of the turn, and the lift besides, with which the feature point moves exactly by the value."""
         from scipy.optimize import brentq
 
@@ -188,25 +194,29 @@ class Lid:
         vertices, weights = skin.points[entry.feature_points[0]]
         wanted = value * self.face.fapu.unit(entry.unit) / self.face.fapu.es0 * entry.direction[1]
 
-        def missing(scale: float) -> float:
-            turned = self._turned(skin.vertices[vertices], share[vertices], value, (scale, 0.0))
+        def missing(scale: float, lift: float = 0.0) -> float:
+            turned = self._turned(skin.vertices[vertices], turn[vertices], value, (scale, lift))
             return float(weights @ turned[:, 1]) - wanted
 
-        turn = float(np.abs(self._turn(skin.vertices[vertices, 0], share[vertices], value)).max())
-        most = FARTHEST / turn
+        most = FARTHEST / float(np.abs(turn[vertices]).max())
         if missing(0.0) * missing(most) < 0.0:
             return float(brentq(missing, 0.0, most, xtol=1e-13)), 0.0
-        return most, -missing(most) / float(weights @ share[vertices])
+        return most, -missing(most) / (missing(most, 1.0) - missing(most))
 
     def _travel(self, value: float) -> Floats:
         """Share of the opening for each of the eye's slices."""
         count = len(self.eye.open)
         beside = _smoothstep(np.abs(np.linspace(-1.0, 1.0, count + 2)[1:-1]) / BESIDE)
-        opening = self.eye.opening
-        beyond = OVERLAP * opening.max() / np.where(self.eye.open, opening, np.inf)
         closed = value / FAPU_DIVISOR
-        travel: Floats = closed * (1.0 + closed**2 * beside * beyond)
-        return travel
+        travel: Floats = closed * (1.0 + closed**2 * beside * OVERLAP)
+        return travel * self._ends(self.eye.lids[self.part].span, value)
+
+    def _ends(self, x: Floats, value: float) -> Floats:
+        """Factor of the way at x: less than 1 at both ends of a closing lid."""
+        first, last = self.slices[0], self.slices[-1]
+        inside = np.minimum(x - first, last - x) / (NEAR_END * (last - first))
+        factor: Floats = 1.0 - SPARE * max(value, 0.0) / FAPU_DIVISOR * (1.0 - _smoothstep(inside))
+        return factor
 
     @property
     def middle(self) -> Floats:
@@ -270,16 +280,12 @@ def _lid(face: PreparedFace, fap_id: int) -> Lid | None:
     if eye is None or ball is None:
         return None
     center = ball.center / face.fapu.es0
-    corners = np.array([face.skin.positions[k] for k in EYES[side][0]])
-    own, other = (_rim_line(eye, k, corners) - center for k in (part, 1 - part))
+    own, other = (_rim_line(eye, k) - center for k in (part, 1 - part))
     heights = np.stack([own[:, 1], np.interp(own[:, 0], other[:, 0], other[:, 1])])
-    way = (1.0, -1.0)[part]
-    for end, inner in ((0, 1), (-1, -2)):
-        heights[1, end] = heights[0, end] + way * min(way * (heights[1, inner] - heights[0, end]), 0.0)
     reach = np.stack([np.hypot(*own[:, 1:].T), np.interp(own[:, 0], other[:, 0], np.hypot(*other[:, 1:].T))])
-    nothing = np.zeros(face.skin.vertex_count)
-    found = Lid(face, fap_id, eye, part, ball, own[:, 0] + center[0], heights, reach, nothing, nothing)
-    closing, opening = (_shares(found, above) for above in (CLOSING, OPENING))
+    still = Follow(np.zeros(0), np.zeros(0))
+    found = Lid(face, fap_id, eye, part, ball, own[:, 0] + center[0], heights, reach, still, still)
+    closing, opening = (_constructed(found, above) for above in (CLOSING, OPENING))
     return replace(found, closing=closing, opening=opening)
 
 
@@ -313,40 +319,58 @@ def eyeball(face: PreparedFace, pupil: str) -> Ball | None:
 
 
 def _to_the_corners(eye: Eye | None) -> Eye | None:
-    """The eye with slices added towards its corners, as long as it is less and less open there."""
+    """The eye with all slices up to where it is narrowest towards each corner.
+
+    Beyond that the lids are grown together, and what looks like a rim is a fold of the skin.
+    """
     if eye is None:
         return None
     opening = eye.heights[0] - eye.heights[1]
-    added = eye.open.copy()
-    used = np.flatnonzero(added)
-    for slices in (range(used[0] - 1, -1, -1), range(used[-1] + 1, len(opening))):
-        for k in slices:
-            inner = opening[k + 1 if k < used[0] else k - 1]
-            if not 0.0 < opening[k] <= inner:
-                break
-            added[k] = True
-    return replace(eye, open=added)
+    used = np.zeros(len(opening), dtype=bool)
+    for side in (np.arange(SLICES - 1, -1, -1), np.arange(SLICES - 1, len(opening))):
+        apart = np.append(opening[side] > 0.0, False)
+        side = side[: int(np.argmin(apart))]
+        used[side[: int(np.argmin(opening[side])) + 1]] = True
+    return replace(eye, open=used)
 
 
-def _rim_line(eye: Eye, part: int, corners: Floats) -> Floats:
-    """Places (s, 3) along a rim by rising x, from corner to corner."""
+def _rim_line(eye: Eye, part: int) -> Floats:
+    """Places (s, 3) along a rim by rising x."""
     lid = eye.lids[part]
     heights, edges, shares = lid.rim(lid.rest)
     used = eye.open & np.isfinite(heights)
     a, b = (lid.rest[edges[used, k]] for k in range(2))
-    return np.concatenate([corners[:1], a + shares[used, None] * (b - a), corners[1:]])
+    line: Floats = a + shares[used, None] * (b - a)
+    return line
 
 
-def _shares(lid: Lid, above: float) -> Floats:
-    """Shares that fall from 1 at the rim to 0 where the skin rests, `above` from the rim outside."""
+def _constructed(lid: Lid, above: float) -> Follow:
+    """Skin that follows the rim smoothly and rests `above` it outside."""
     rim, rest = _regions(lid, above)
-    firmness = np.where(rim, HELD, 0.0)
-    firmness[rest] = np.inf
-    return _plate(lid.face)(np.where(rim, 1.0, 0.0), firmness, SMOOTH)
+    shares, firmness = _corners(lid)
+    firmness[rim], firmness[rest] = HELD, np.inf
+    return Follow(np.where(rim, 1.0, np.where(rest, 0.0, shares)), firmness)
 
 
-def _modelled(lid: Lid, unit: Offsets) -> Floats:
-    """Shares of a modelled closing: the angle by which each vertex is turned beside that of the rim at its x."""
+def _corners(lid: Lid) -> tuple[Floats, Floats]:
+    """Shares (n,) and their firmness of the skin between the ends of both rims: it closes like a bellows."""
+    skin, labels = lid.face.skin, lid.face.labels.values
+    shares, firmness = np.zeros(skin.vertex_count), np.zeros(skin.vertex_count)
+    lines = [_rim_line(lid.eye, k) for k in (lid.part, 1 - lid.part)]
+    for end in (0, -1):
+        own, other = (line[end] for line in lines)
+        way = other - own
+        at = np.clip((skin.vertices - own) @ way / (way @ way), 0.0, 1.0)
+        away = np.linalg.norm(skin.vertices - own - at[:, None] * way, axis=1)
+        between = (labels == 0) & (away < CORNER * np.linalg.norm(way))
+        height = np.clip((skin.vertices[:, 1] - other[1]) / (own[1] - other[1]), 0.0, 1.0)
+        shares[between] = height[between]
+        firmness[between] = HELD
+    return shares, firmness
+
+
+def _modelled(lid: Lid, unit: Offsets) -> Follow:
+    """As a modelled closing does: the angle by which each vertex is turned beside that of the rim at its x."""
     skin = lid.face.skin
     y, z = (skin.vertices - lid.middle)[:, 1:].T
     moved = skin.vertices - lid.middle + skin.join(unit) / lid.face.fapu.es0
@@ -356,9 +380,11 @@ def _modelled(lid: Lid, unit: Offsets) -> Floats:
     full = float((point @ angle)[0]) / float((point @ rims)[0])
     shares = np.clip(np.divide(angle, full * rims, out=np.zeros_like(angle), where=rims != 0.0), 0.0, 1.0)
     rim, rest = _regions(lid, OPENING)
-    firmness = (rims / np.abs(rims).max()) ** 2
+    between, firmness = _corners(lid)
+    shares = np.where(firmness > 0.0, between, shares)
+    firmness = np.maximum(firmness, (rims / np.abs(rims).max()) ** 2)
     firmness[rim], firmness[rest] = HELD, np.inf
-    return _plate(lid.face)(np.where(rim, 1.0, np.where(rest, 0.0, shares)), firmness, SMOOTH)
+    return Follow(np.where(rim, 1.0, np.where(rest, 0.0, shares)), firmness)
 
 
 def _regions(lid: Lid, above: float) -> tuple[Bools, Bools]:

@@ -12,15 +12,15 @@ from authoring.lids import CONSTRUCTIONS, LIDS, close_lid, findings, lid
 from cloning.eyeballs import balls
 from cloning.prepare import PreparedFace
 from cloning.rims import eyes
+from fat.fap_quality import FLIPS_MUST
 from fat.quality import asymmetry, cross_talk, fap_values, feature_point_motion, flips, mirror_map
+from fba.amplitudes import amplitudes
 from fba.arrays import Floats
 
 Shipped = Callable[[str], PreparedFace]
 HEADS = ("source", "quad_head", "tri_head")
 NEAR_MUST = 0.2
 """Percent of the skin near an eyeball that may enter it."""
-FOLDED = 0.3
-"""Percent of moving triangles that may turn over: the margins in the corners of the eye."""
 DEEP = 0.02
 """Deeper than this, in radii, counts."""
 
@@ -50,12 +50,15 @@ def penetration(face: PreparedFace, offsets: Offsets) -> float:
 
 
 def left_open(face: PreparedFace, offsets: Offsets) -> float:
-    """Largest gap between the left eye's rims as a share of its largest opening; the corners' last slices left out."""
+    """Largest gap between the left eye's rims as a share of its largest opening; the an eighth at each end,
+    where a lid leaves room for the margin, left out."""
     eye = eyes(face)[0]
     assert eye is not None
     skin = skin_of(face, offsets)
     upper, lower = (part.rim(part.rest + skin[part.vertices])[0] for part in eye.lids)
-    return float(np.nanmax((upper - lower)[eye.open]) / eye.opening.max())
+    slices = np.flatnonzero(eye.open)
+    end = len(slices) // 8
+    return float(np.nanmax((upper - lower)[slices[end : len(slices) - end]]) / eye.opening.max())
 
 
 @pytest.mark.parametrize("name", HEADS)
@@ -77,7 +80,7 @@ def test_any_mixture_of_upper_and_lower_lid_closes_the_eye(shipped: Shipped, nam
     assert left_open(face, {}) > 0.9
     assert left_open(face, up[512]) > 0.3, "half-way the eye is open"
     for closed in (up[1024], added(up[512], low[512]), added(up[768], low[256])):
-        assert left_open(face, closed) < 0.03
+        assert left_open(face, closed) < 0.04
 
 
 def test_dense_face_closes_and_stays_clear(ict: PreparedFace) -> None:
@@ -89,11 +92,20 @@ def test_dense_face_closes_and_stays_clear(ict: PreparedFace) -> None:
     assert left_open(ict, close_lid(ict, 19, [1024])[1024]) < 0.03
 
 
-def test_opening_wide_and_half_closing_fold_hardly_anything(shipped: Shipped) -> None:
+@pytest.mark.parametrize("fap_id", LIDS)
+def test_lids_of_the_source_fold_nothing_as_far_as_they_usually_go(shipped: Shipped, fap_id: int) -> None:
     face = shipped("source")
-    for fap_id, border in ((19, -512), (19, 256), (21, -256), (21, 256)):
-        skin = skin_of(face, CONSTRUCTIONS[fap_id].make(face, border))
-        assert flips(face.skin.vertices, face.skin.triangles, skin) <= FOLDED, (fap_id, border)
+    values = amplitudes()[fap_id].values
+    for value, offsets in close_lid(face, fap_id, values).items():
+        assert flips(face.skin.vertices, face.skin.triangles, skin_of(face, offsets)) == 0.0, value
+
+
+def test_closed_lids_of_the_source_fold_hardly_anything_at_their_limit(shipped: Shipped) -> None:
+    face = shipped("source")
+    for fap_id in (19, 21):
+        border = CONSTRUCTIONS[fap_id].borders[-1]
+        skin = skin_of(face, close_lid(face, fap_id, [border])[border])
+        assert flips(face.skin.vertices, face.skin.triangles, skin) <= FLIPS_MUST
 
 
 def test_rim_keeps_its_distance_from_the_middle_of_the_ball(shipped: Shipped) -> None:
@@ -129,7 +141,7 @@ def test_lashes_turn_with_the_lid(shipped: Shipped) -> None:
     before, after = (
         np.linalg.norm(v[edges[:, 0]] - v[edges[:, 1]], axis=1) for v in (rest, rest + moved["lashes_left"])
     )
-    assert len(edges) > 50
+    assert len(edges) > 40
     assert abs(np.median(after / before) - 1.0) < 0.1
     tips = moved["lashes_left"][upper]
     assert tips[:, 1].max() < 0.0, "every upper lash goes down"
@@ -138,12 +150,13 @@ def test_lashes_turn_with_the_lid(shipped: Shipped) -> None:
 def test_spread_of_a_modelled_lid_is_taken(shipped: Shipped) -> None:
     face = shipped("source")
     unit = close_lid(face, 19, [512])[512]
-    found, made = lid(face, 19, unit), lid(face, 19)
-    assert found is not None
+    made = lid(face, 19)
     assert made is not None
-    inside = np.abs(face.skin.vertices[:, 0] - made.middle[0]) < 0.1
-    assert np.abs(found.closing - made.closing)[inside].max() < 0.15
     offsets = close_lid(face, 19, [1024], unit)[1024]
+    taken, constructed = (skin_of(face, o) for o in (offsets, close_lid(face, 19, [1024])[1024]))
+    size = np.linalg.norm(constructed, axis=1).max()
+    inside = np.abs(face.skin.vertices[:, 0] - made.middle[0]) < 0.1
+    assert np.linalg.norm(taken - constructed, axis=1)[inside].max() < 0.15 * size
     assert fap_values(feature_point_motion(face.points, offsets), face.fapu)[19] == pytest.approx(1024)
     assert left_open(face, offsets) < 0.03
 
