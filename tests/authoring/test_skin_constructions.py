@@ -12,10 +12,13 @@ import pytest
 from authoring import brows, cheeks, chin, ears, lips, nose
 from authoring.clearance import before_eyeballs
 from authoring.construction import Construction, Offsets
+from authoring.contact import Lips
 from cloning.eyeballs import balls
 from cloning.prepare import PreparedFace, prepare
+from cloning.visibility import visible
 from fat.quality import asymmetry, cross_talk, fap_values, feature_point_motion, flips, mirror_map
 from fba.arrays import Floats
+from fba.closest import TriangleSearch
 from fba.faps import fap
 from formats import read_face, read_scene
 from formats.landmarks import read_landmarks
@@ -104,6 +107,36 @@ def test_a_lip_leaves_the_other_lip_alone(fap_id: int) -> None:
     upper = fap_id in (4, 51)
     moved = skin_motion(face, ALL[fap_id].make(face, 300))
     assert not moved[face.labels.values == (2 if upper else 1)].any()
+
+
+@pytest.mark.parametrize(("fap_id", "value"), [(6, 300), (12, 300), (12, -300), (18, 420), (51, -300), (57, 300)])
+def test_lips_that_touch_stay_together(fap_id: int, value: int) -> None:
+    """Along the whole line of contact no gap opens that a tooth could shine through: 0.15 mm on a human face."""
+    face, lips = source(), Lips(source())
+    edges = []
+    for lip, rest in enumerate(lips.edges_at_rest):
+        search = TriangleSearch(face.skin.vertices, face.skin.triangles)
+        moved = skin_motion(face, ALL[fap_id].make(face, value))
+        found = [search.closest(spot) for spot in rest[4:-4:6]]
+        edges.append(np.array([w @ moved[face.skin.triangles[t]] for t, w, _ in found]))
+        assert (face.labels.values[face.skin.triangles[[t for t, _, _ in found]]] == lip + 1).any(axis=1).all()
+    assert np.abs(edges[0]).max() < 0.25
+    assert (edges[0] - edges[1])[:, 1].max() < 2.5e-3
+
+
+@pytest.mark.parametrize("value", [120, -80])
+def test_a_cheek_is_puffed_and_sucked_in_as_a_broad_dome(value: int) -> None:
+    """Half as high still 0.3 eye separations behind its middle, and nothing at the corner of the mouth."""
+    face = source()
+    made = ALL[39].make(face, 300 if value > 0 else -300)
+    moved = np.linalg.norm(skin_motion(face, made), axis=1)
+    at, seen = face.skin.positions, visible(face.skin)
+    top, corner = at["5.1"], at["8.3"]
+    spot = top + 0.3 * (top - corner) / np.linalg.norm(top - corner)
+    behind = np.linalg.norm(face.skin.vertices - spot, axis=1) < 0.12
+    near = np.linalg.norm(face.skin.vertices - top, axis=1) < 0.06
+    assert moved[seen & behind].min() > 0.5 * moved[seen & near].max()
+    assert moved[seen & (np.linalg.norm(face.skin.vertices - corner, axis=1) < 0.02)].max() < 0.2 * moved.max()
 
 
 @pytest.mark.parametrize(("inner", "outer"), [(6, 53), (7, 54), (12, 59), (13, 60)])
