@@ -29,6 +29,16 @@ TONGUE_REACH = 0.12
 TOUCHING = 0.06
 """Gums nearer than this to teeth move with them, in eye separations."""
 
+RIM, PASSES = 0.95, 4
+COARSER = 1.5
+"""A pupil's rim on a coarse eyeball is widened or narrowed by at most this factor to move as far as the source's."""
+
+STILL = 1e-3
+"""Feature points that move less than this share of a motion's largest offset rest."""
+
+BUMP = 0.5
+"""Width of what is added around a feature point of the tongue, of the distance to the next one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Body:
@@ -103,9 +113,17 @@ def eye_mover(source: PreparedFace, target: PreparedFace, mine: Body, yours: Bod
     center_t = eye_center(yours.vertices, target.place(pupil))
     ratio = np.full(3, target.fapu.base(Unit.ES) / source.fapu.base(Unit.ES))
     size = fit_sphere(yours.vertices)[1] / fit_sphere(mine.vertices)[1]
-    places = center_s + (yours.vertices - center_t) / size
+    iris = target.fapu.irisd0 / source.fapu.irisd0
+    gaze = (target.place(pupil) - center_t) / np.linalg.norm(target.place(pupil) - center_t)
+    away = yours.vertices - center_t
+    along = away @ gaze
+    front = (along > 0.0)[:, None]
+    places = center_s + np.where(
+        front, along[:, None] * gaze / size + (away - along[:, None] * gaze) / iris, away / size
+    )
     triangles, weights, _ = nearest_on(places, mine.vertices, mine.triangles)
     corners = mine.triangles[triangles]
+    at_pupil = _point_rows(source, mine, [pupil]), _point_rows(target, yours, [pupil])
 
     def move(offsets: Floats) -> Floats:
         motion = fit_rigid(mine.vertices, offsets, center_s)
@@ -113,10 +131,47 @@ def eye_mover(source: PreparedFace, target: PreparedFace, mine: Body, yours: Bod
         soft = motion.residual > RIGID
         if soft.any():
             rest = offsets - motion.offsets(mine.vertices, center_s, np.ones(3))
-            out[:, soft] += size * np.einsum("nc,nckd->nkd", weights, rest[corners][:, :, soft])
+            goals = _at(at_pupil[0], offsets[:, soft]) * ratio
+            wanted = _farthest(iris * rest[:, soft])
+            out[:, soft] += _exact(
+                iris * np.einsum("nc,nckd->nkd", weights, rest[corners][:, :, soft]),
+                out[:, soft],
+                goals,
+                wanted,
+                at_pupil[1],
+            )
         return out
 
     return move
+
+
+def _exact(added: Floats, rigid: Floats, goals: Floats, wanted: Floats, rows: Floats) -> Floats:
+    """What is added (n, K, 3) to a rigid motion: its rim goes as far as wanted (K,), the pupil's point to its goal.
+
+    Parameters
+    ----------
+    goals : (k, K, 3) of the points of rows (k, n); k is 0 where the pupil is no point of the ball.
+    """
+    for _ in range(PASSES):
+        far = _farthest(added)
+        added = added * np.clip(wanted / np.maximum(far, 1e-300), 1.0 / COARSER, COARSER)[:, None]
+        for row, goal in zip(rows, goals, strict=False):
+            added += row[:, None, None] * (goal - _at(row[None], rigid + added)[0]) / (row @ row)
+    return added
+
+
+def _farthest(offsets: Floats) -> Floats:
+    """(K,) mean length of the offsets (n, K, 3) that are nearly the longest: a rim's."""
+    length = np.linalg.norm(offsets, axis=2)
+    rim = length > RIM * length.max(axis=0)
+    mean: Floats = (length * rim).sum(axis=0) / np.maximum(rim.sum(axis=0), 1)
+    return mean
+
+
+def _at(rows: Floats, offsets: Floats) -> Floats:
+    """(k, K, 3) offsets (n, K, 3) at points."""
+    at: Floats = np.einsum("pn,nkd->pkd", rows, offsets)
+    return at
 
 
 def tongue_mover(
@@ -143,8 +198,15 @@ def tongue_mover(
     gums = ~near & (np.minimum(to_upper, to_lower) < TOUCHING)
     fill = HarmonicFill(yours.vertices, polygon_edges(yours.indices, yours.offsets), ~(near | gums))
 
+    at_mine, at_yours = (_point_rows(f, b, ids) for f, b in ((source, mine), (target, yours)))
+    bumps = _bumps(yours.vertices, at_yours)
+
     def move(offsets: Floats) -> Floats:
-        out = np.einsum("nc,nckd->nkd", weights, offsets[corners]) * ratio
+        goals = _at(at_mine, offsets)
+        scales = _scales(goals, ratio, at_mine @ mine.vertices, at_yours @ yours.vertices, ids)
+        out = np.einsum("nc,nckd->nkd", weights, offsets[corners]) * scales
+        missing = goals * scales - _at(at_yours, out)
+        out += np.einsum("np,pkd->nkd", bumps, missing)
         teeth = jaw()
         out[gums] = 0.0
         follows = gums & (to_lower < to_upper)
@@ -156,6 +218,48 @@ def tongue_mover(
         return filled
 
     return move
+
+
+def _point_rows(face: PreparedFace, of: Body, ids: Sequence[str]) -> Floats:
+    """(k, n) weights of feature points over the vertices of a body; zero where they lie elsewhere."""
+    rows = np.zeros((len(ids), len(of.vertices)))
+    for k, key in enumerate(ids):
+        point = face.points.get(key)
+        if point is not None and point.shape in of.names:
+            start = of.starts[of.names.index(point.shape)]
+            for vertex, weight in zip(point.vertices, point.weights, strict=True):
+                rows[k, start + vertex] += weight
+    return rows[rows.any(axis=1)]
+
+
+def _bumps(places: Floats, rows: Floats) -> Floats:
+    """(n, k) smooth functions over vertices (n, 3), each 1 at its own point of rows (k, n) and 0 at the others."""
+    at = rows @ places
+    between = np.linalg.norm(at[:, None] - at[None], axis=2)
+    np.fill_diagonal(between, np.inf)
+    width = BUMP * between.min(axis=1, initial=np.inf)
+    width = np.where(np.isfinite(width), width, np.ptp(places, axis=0).max())
+    away = np.linalg.norm(places[:, None] - at[None], axis=2)
+    round_ = np.exp(-0.5 * (away / width) ** 2)
+    bumps: Floats = round_ @ np.linalg.pinv(rows @ round_)
+    return bumps
+
+
+def _scales(goals: Floats, ratio: Floats, mine: Floats, yours: Floats, ids: Sequence[str]) -> Floats:
+    """(K, 3) factors of motions of the tongue: the FAPUs', but for a roll, which turns by the same angle.
+
+    Parameters
+    ----------
+    goals : (k, K, 3) offsets of the source's feature points.
+    mine, yours : (k, 3) where they lie.
+    """
+    scales = np.broadcast_to(ratio, (goals.shape[1], 3)).copy()
+    if len(ids) < 4 or len(mine) < 4 or len(yours) < 4:
+        return scales
+    size = np.linalg.norm(goals, axis=2)
+    rolls = size[:2].max(axis=0) < STILL * size[2:].max(axis=0)
+    scales[rolls] = np.linalg.norm(yours[2] - yours[3]) / np.linalg.norm(mine[2] - mine[3])
+    return scales
 
 
 def _onto_tongue(source: PreparedFace, target: PreparedFace, mine: Body, yours: Body, ids: Sequence[str]) -> Floats:

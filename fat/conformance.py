@@ -129,7 +129,7 @@ class Probe:
         unit = self._face.fapu.unit(definition.unit)
         kind: Kind
         if definition.direction is not None:
-            if not self._on_surface(point):
+            if not self._on_surface(point) or (point in _EYE_ROLES and not self._eye_shapes(point)):
                 return None
             motion = (moved[point] - self._rest[point]) / unit
             along = float(motion @ definition.direction)

@@ -69,8 +69,14 @@ class FapError:
     fap_id: int | None
 
 
+ROUNDING = 0.01
+"""Motions below this, in FAP units, are what 32-bit tables leave of none."""
+
+
 def fap_error(source: Mapping[int, float], target: Mapping[int, float]) -> FapError:
     """Compare two motions by their `fap_values`; FAPs that one side lacks are left out.
+
+    The relative error is infinite where the source is still and the target is not.
 
     >>> fap_error({3: 1000.0, 5: -500.0}, {3: 1030.0, 5: -500.0})
     FapError(relative=0.02, largest=30.0, fap_id=3)
@@ -80,7 +86,7 @@ def fap_error(source: Mapping[int, float], target: Mapping[int, float]) -> FapEr
     total = sum(abs(source[k]) for k in common)
     worst = max(errors, key=lambda k: errors[k], default=None)
     wrong = sum(errors.values())
-    relative = wrong / total if total else (float("inf") if wrong else 0.0)
+    relative = wrong / total if total else (float("inf") if wrong > ROUNDING else 0.0)
     return FapError(relative, 0.0 if worst is None else errors[worst], worst)
 
 

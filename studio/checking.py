@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,15 +11,17 @@ import numpy as np
 
 from fat.build import face_motions
 from fat.conformance import FapConformance, conformance
-from fat.evaluate import Player
+from fat.evaluate import Player, Pose
 from fat.face import AnimatableFace
 from fat.fap_quality import FapQuality
 from fat.motion import FaceMotion
 from fat.quality import fap_error, fap_values, feature_point_motion, flips, lid_gap, lip_gap_change
 from fat.validate import validate
+from fba.amplitudes import amplitudes
 from fba.arrays import Floats
-from fba.faps import LOW_LEVEL_FAPS
+from fba.faps import EXPRESSION_FAP, LOW_LEVEL_FAPS, VISEME_FAP
 from fba.findings import Finding
+from fba.high_level import BLEND_MAX
 from fba.scene import Role
 from studio.fap_measuring import measure_faps
 
@@ -30,7 +32,7 @@ LIP_GAP_MUST = 0.01
 LID_GAP_MUST = 0.05
 """IRISD; how much wider than the source's an eye may stay open after a blink."""
 FLIPS_MUST = 0.3
-"""Percent of moving triangles beyond the source's, mean over all motions."""
+"""Percent of moving triangles beyond the source's, mean over all motions at their normal amplitudes."""
 BLINK = {19: 1024.0, 20: 1024.0}
 
 
@@ -197,8 +199,8 @@ def fidelity(face: AnimatableFace, source: AnimatableFace) -> Fidelity | None:
         lips[lip],
         lip,
         _lid_gap_beyond(face, source),
-        _flips(face, [mine[k] for k in common]),
-        _flips(source, [theirs[k] for k in common]),
+        _flips(face, source),
+        _flips(source, face),
     )
 
 
@@ -206,15 +208,29 @@ def _points(face: AnimatableFace, motion: FaceMotion) -> dict[str, Floats]:
     return feature_point_motion(face.feature_points, motion.offsets)
 
 
-def _flips(face: AnimatableFace, motions: list[FaceMotion]) -> float:
+def _flips(face: AnimatableFace, other: AnimatableFace) -> float:
+    """Mean share of flipped triangles, in percent, at the normal amplitudes of all motions that both faces have."""
+    keys = {t.key for t in face.tables if t.meshes} & {t.key for t in other.tables if t.meshes}
     skins = [(s.name, face.scene.world_vertices(s.name), s.mesh.triangles) for s in face.scene.with_role(Role.SKIN)]
-    values = [
-        flips(vertices, triangles, motion.offsets[name])
-        for motion in motions
-        for name, vertices, triangles in skins
-        if name in motion.offsets
-    ]
+    player = Player(face)
+    values = []
+    for pose in (pose for key in sorted(keys) for pose in _normal_poses(player, *key)):
+        moved = pose.world_shapes()
+        for name, vertices, triangles in skins:
+            offsets = moved[name] - vertices
+            if offsets.any():
+                values.append(flips(vertices, triangles, offsets))
     return float(np.mean(values)) if values else 0.0
+
+
+def _normal_poses(player: Player, fap_id: int, select: int) -> Iterator[Pose]:
+    if fap_id == VISEME_FAP:
+        yield player.pose(viseme=(select, 0, BLEND_MAX))
+    elif fap_id == EXPRESSION_FAP:
+        yield player.pose(expression=(select, BLEND_MAX, 0, 0))
+    else:
+        for value in amplitudes()[fap_id].values:
+            yield player.pose({fap_id: value})
 
 
 def _lid_gap_beyond(face: AnimatableFace, source: AnimatableFace) -> float | None:
