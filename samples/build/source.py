@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from authoring.author import author
+from authoring.riders import carried
+from cloning.prepare import prepare
 from fat.compact import compact
 from fat.face import AnimatableFace
 from fba.arrays import Floats
@@ -38,14 +40,20 @@ def source_head(makehuman: MakeHuman) -> Head:
 def build_source(makehuman: MakeHuman) -> AnimatableFace:
     """The animatable source: scene with nested eye and head rotations, feature points, tables."""
     head = source_head(makehuman)
-    units = {name: _without_lashes(head.unit(name)) for name in ARKIT_UNITS}
-    face, _ = author(colored(head), head.points, units)
+    scene = colored(head)
+    face, _ = author(scene, head.points, source_units(head, scene))
     return replace(face, tables=compact(face.tables, face.fapu))
 
 
-def _without_lashes(unit: dict[str, Floats]) -> dict[str, Floats]:
-    """The lashes were planted anew; they ride on the lids."""
-    return {name: offsets for name, offsets in unit.items() if not name.startswith("lashes")}
+def source_units(head: Head, scene: FaceScene) -> dict[str, dict[str, Floats]]:
+    """MakeHuman's face units on the source; the lashes, which were planted anew, ride on the lids."""
+    face = prepare(scene, head.points, "source")
+    units = {}
+    for name in ARKIT_UNITS:
+        unit = head.unit(name)
+        riding = carried(face, unit["skin"] / face.fapu.es0)
+        units[name] = {**unit, **{shape: face.fapu.es0 * offsets for shape, offsets in riding.items()}}
+    return units
 
 
 def colored(head: Head) -> FaceScene:
