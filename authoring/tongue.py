@@ -14,6 +14,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from authoring.behind_teeth import inner_side
 from authoring.construction import Construction, Offsets
 from authoring.riders import in_mesh_units
 from authoring.spread import spread
@@ -29,7 +30,7 @@ TIP, MIDDLE, BORDERS = "6.1", "6.2", ("6.3", "6.4")
 
 ALL_BORDERS = {
     43: (-1080, -540, -270, -135, 135, 270, 540, 1080),
-    44: (-1080, -540, -270, 270, 540, 1080),
+    44: (-1080, -540, -270, -135, 270, 540, 1080),
     45: (-1080, -270, 270, 1080),
     46: (-1080, 1080),
     47: (10000, 20000, 30000, 45000, 60000, 80000, 100000, 125000, 150000),
@@ -44,6 +45,12 @@ STILL_MIDDLE = 0.08
 
 SHARPEST = 1.2
 """A tongue bends by no more than this angle (rad); what a value asks for beyond that stretches its tip."""
+
+BESIDE_TEETH = 0.5
+"""What is farther to the front than this share of the way from middle to tip draws back behind the front teeth."""
+
+SHORTEST = 0.5
+"""A lowered tip draws back by no more than this share of the way from middle to tip."""
 
 ROLLED = 0.6
 """Share of the way from root to middle within which the tongue rolls up."""
@@ -107,9 +114,21 @@ class Tongue:
         return self._bent(way, 0.5 * (self.along + 1.0), float(self.tip[2] - self.root[2]))
 
     def _raised_tip(self, way: Floats) -> Floats:
-        """FAP 44: the front bends, the middle keeps its height."""
+        """FAP 44: the front bends, the middle keeps its height; a lowered tip draws back behind the teeth."""
         front = np.maximum(self.along - STILL_MIDDLE, 0.0) / (1.0 - STILL_MIDDLE)
-        return self._bent(way, front, (1.0 - STILL_MIDDLE) * float(self.tip[2] - self.middle[2]))
+        moved = self._bent(way, front, (1.0 - STILL_MIDDLE) * float(self.tip[2] - self.middle[2]))
+        return moved if way[1] > 0.0 else moved - self._back(moved, _smoothstep(front))[:, None] * FORWARD
+
+    def _back(self, moved: Floats, share: Floats) -> Floats:
+        """(n,) how far the tongue draws back so that its front is behind the inner side of the lower teeth."""
+        length = float(self.tip[2] - self.middle[2])
+        teeth = inner_side(self.face, float(self.middle[2]) + BESIDE_TEETH * length)
+        if teeth is None:
+            return np.zeros(len(share))
+        front = self.along > BESIDE_TEETH
+        lacking = teeth.in_front((self.surface.vertices + self.free[:, None] * moved)[front]) / share[front]
+        back: Floats = np.clip(lacking.max(initial=0.0), 0.0, SHORTEST * length) * share
+        return back
 
     def _thrust(self, way: Floats) -> Floats:
         """FAP 45: the tongue stretches from its root; the tip goes wholly."""

@@ -10,6 +10,7 @@ import pytest
 
 from authoring.jaw import jaw
 from authoring.tongue import CONSTRUCTIONS, tongue
+from cloning.bodies import body
 from cloning.prepare import PreparedFace
 from fat.build import build_tables
 from fat.conformance import conformance
@@ -84,6 +85,22 @@ def _mean_height(places: Floats) -> tuple[Floats, Floats]:
     depths = np.linspace(places[:, 2].min(), places[:, 2].max(), 12)
     reach = depths[1] - depths[0]
     return depths, np.array([places[np.abs(places[:, 2] - z) <= reach, 1].mean() for z in depths])
+
+
+@pytest.mark.parametrize("name", HEADS)
+def test_lowered_tip_draws_back_behind_the_lower_teeth(shipped: Shipped, name: str) -> None:
+    face = shipped(name)
+    found, teeth = tongue(face), body(face, Role.LOWER_TEETH)
+    assert found is not None
+    assert teeth is not None
+    es0, tip = face.fapu.es0, face.place("6.1")
+    middle = np.abs(teeth.vertices[:, 0] - tip[0]) < 0.02 * es0
+    for value in (-1080, -540):
+        _, rest, offsets = moved(face, 44, value)
+        lowered = (rest + offsets)[np.abs(rest[:, 0] - tip[0]) < 0.02 * es0]
+        beside = teeth.vertices[middle & (teeth.vertices[:, 1] > lowered[np.argmax(lowered[:, 2]), 1])]
+        assert len(beside)
+        assert lowered[:, 2].max() < beside[:, 2].min(), value
 
 
 def test_rolled_borders_turn_up_and_the_middle_rests(shipped: Shipped) -> None:
