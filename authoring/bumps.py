@@ -14,6 +14,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from authoring.laplacian import all_fans, cotangents, laplacian
 from cloning.labels import OPPOSITE
 from cloning.prepare import PreparedFace
 from cloning.surface import Surface
@@ -22,6 +23,9 @@ from fba.faps import faps
 
 FLATTEST = 0.02
 """Least weight of an edge, as a share of the mean: negative cotangents of obtuse corners fold the skin."""
+
+STEEPEST = 20.0
+"""Largest cotangent: corners sharper than 3 degrees count as that."""
 
 SMALLEST = 1e-3
 """Least area of a vertex, as a share of the mean: slivers would count without bound."""
@@ -38,9 +42,6 @@ LOOSE = 1e-12
 
 UNTOUCHED = 1e-12
 """A place whose vertices have less weight than this is held still anyway."""
-
-STEEPEST = 20.0
-"""Largest cotangent: corners sharper than 3 degrees count as that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,23 +80,8 @@ class Bumps:
     labels: Ints
 
     @cached_property
-    def _group(self) -> Ints:
-        """(n,) the place of each vertex; copies along a seam share one."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        n, links = self.surface.vertex_count, self.surface.links
-        pairs = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(n, n))
-        group: Ints = connected_components(pairs, directed=False)[1]
-        return group
-
-    @cached_property
     def _fans(self) -> tuple[Ints, Floats]:
-        """Triangles (t, 3) of all fans of all polygons, and the share (t,) with which each counts.
-
-        A polygon bends as the mean of its fans from every corner, so that mirrored polygons bend alike.
-        """
-        return _all_fans(*self.surface.polygons)
+        return all_fans(*self.surface.polygons)
 
     def side(self, key: str) -> Bools:
         """(n,) the skin that may move with a feature point: all but the lip or lid opposite to its own."""
@@ -114,16 +100,17 @@ class Bumps:
     def patch(self, free: Bools) -> Patch:
         """The part of the skin that may move: (n,) bool. Weights are 0 elsewhere and end without a slope."""
         triangles, share = self._fans
-        corners = self._group[triangles]
-        held = np.zeros(int(self._group.max()) + 1, dtype=bool)
-        held[self._group[~free]] = True
+        group = self.surface.places
+        corners = group[triangles]
+        held = np.zeros(int(group.max()) + 1, dtype=bool)
+        held[group[~free]] = True
         places = np.flatnonzero(~held).astype(np.int32)
         inside = ~held
         inside[corners[inside[corners].any(axis=1)]] = True
         used = inside[corners].any(axis=1)
         around, local = np.unique(corners[used], return_inverse=True)
         return Patch(
-            self._group,
+            group,
             places,
             triangles[used],
             share[used],
@@ -149,7 +136,7 @@ class Bumps:
         weights = np.concatenate([p.weights for p in more]) if more else np.zeros(0)
         n = self.surface.vertex_count
         extra = coo_array((weights, (row, column)), shape=(len(more), n))
-        spread = csr_array((np.ones(n), (np.arange(n), self._group)))
+        spread = csr_array((np.ones(n), (np.arange(n), self.surface.places)))
         rows = (vstack([self.surface.point_matrix(keys), extra]) @ spread).tocsr()
         return Goals(rows, np.array(values)[:, None], np.repeat([0.0, SOFT], [len(keys), len(more)]))
 
@@ -205,9 +192,14 @@ class Patch:
         """(k, k) sparse: ``w @ bending @ w`` is the bending of a weight over the places, 0 around them."""
         from scipy.sparse import csc_array, diags_array
 
-        stretch, area = _stiffness(lying[self.triangles], self.share, self.corners)
+        count = int(self.corners.max()) + 1
+        links, area = cotangents(lying[self.triangles], self.share, self.corners, count, STEEPEST)
+        links.setdiag(0.0)
+        least = FLATTEST * float(np.abs(links.data).mean())
+        links.data = np.where(links.data != 0.0, np.maximum(links.data, least), 0.0)
+        links.eliminate_zeros()
         inverse = diags_array(1.0 / np.maximum(area, SMALLEST * float(area.mean())))
-        columns = stretch.tocsc()[:, self.columns]
+        columns = laplacian(links).tocsc()[:, self.columns]
         bending = csc_array(columns.T @ inverse @ columns)
         return bending + diags_array(np.full(len(self.places), LOOSE * float(bending.diagonal().mean())), format="csc")
 
@@ -226,51 +218,3 @@ def pinned(axis: int, but: Collection[str] = ()) -> list[str]:
     """Feature points that some FAP moves along an axis (0 x, 1 y, 2 z), without some: cross-talk is measured there."""
     found = {f.feature_points[0]: None for f in faps() if f.direction is not None and abs(f.direction[axis]) > 0.5}
     return [k for k in found if k not in but]
-
-
-def _stiffness(places: Floats, share: Floats, corners: Ints) -> tuple[Any, Floats]:
-    """Cotangent Laplacian (k, k), positive semidefinite, and the area (k,) of each place.
-
-    Parameters
-    ----------
-    places : (t, 3, 3) corners of triangles. share : (t,) with which each counts. corners : (t, 3) their numbers.
-    """
-    from scipy.sparse import coo_array, diags_array
-
-    count = int(corners.max()) + 1
-    area = np.zeros(count)
-    rows, columns, values = [], [], []
-    for k in range(3):
-        apex, a, b = (places[:, (k + s) % 3] for s in range(3))
-        u, v = a - apex, b - apex
-        along = (u * v).sum(axis=1)
-        cross = np.sqrt(np.maximum((u * u).sum(axis=1) * (v * v).sum(axis=1) - along**2, 0.0))
-        cotangent = along / np.maximum(cross, 1e-12)
-        rows.append(corners[:, (k + 1) % 3])
-        columns.append(corners[:, (k + 2) % 3])
-        values.append(0.5 * share * np.clip(cotangent, -STEEPEST, STEEPEST))
-        area += np.bincount(corners[:, k], share * cross / 6.0, count)
-    edges = coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
-    links = (edges + edges.T).tocsr()
-    links.setdiag(0.0)
-    links.data = np.where(links.data != 0.0, np.maximum(links.data, FLATTEST * float(np.abs(links.data).mean())), 0.0)
-    links.eliminate_zeros()
-    return diags_array(np.asarray(links.sum(axis=1)).ravel()) - links, area
-
-
-def _all_fans(indices: Ints, offsets: Ints) -> tuple[Ints, Floats]:
-    """Triangles (t, 3) of all fans of all polygons, and the share (t,) with which each counts."""
-    arity = np.diff(offsets)
-    triangles, shares = [], []
-    for k in np.unique(arity):
-        polygons = indices[offsets[:-1][arity == k][:, None] + np.arange(k)]
-        if k == 3:
-            triangles.append(polygons)
-            shares.append(np.ones(len(polygons)))
-            continue
-        for start in range(k):
-            turned = np.roll(polygons, -start, axis=1)
-            for step in range(1, k - 1):
-                triangles.append(turned[:, [0, step, step + 1]])
-                shares.append(np.full(len(polygons), 1.0 / k))
-    return np.concatenate(triangles), np.concatenate(shares)

@@ -7,11 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from authoring.laplacian import cotangents, laplacian
 from cloning.surface import Surface
-from fba.arrays import Floats, Ints
+from fba.arrays import Floats
 
 FLATTEST = 0.02
-"""Least weight of an edge as a share of the mean: cotangents of obtuse corners are negative and would overshoot."""
+"""Least weight of an edge as a share of the median: cotangents of obtuse corners are negative and would overshoot."""
+
+STEEPEST = 50.0
+"""Largest weight of an edge: slivers would stiffen the skin around them."""
+
+SMALLEST = 1e-3
+"""Least area of a vertex, as a share of the mean: slivers would count without bound."""
 
 FAINTEST = 1e-9
 """Firmness that every vertex has: pieces of a mesh on which nothing is wanted rest."""
@@ -67,49 +74,14 @@ class Spread:
 
 
 def spread(surface: Surface) -> Spread:
-    """The spread of a skin, in eye separations."""
-    return mesh_spread(surface.vertices, surface.triangles, surface.links)
+    """The spread of a surface, in eye separations."""
+    from scipy.sparse import diags_array
 
-
-def mesh_spread(vertices: Floats, triangles: Ints, links: Ints) -> Spread:
-    """The spread of a triangle mesh.
-
-    Parameters
-    ----------
-    vertices : (n, 3). triangles : (t, 3). links : (l, 2) vertices at one place that move as one.
-    """
-    from scipy.sparse import coo_array, csr_array, diags_array
-    from scipy.sparse.csgraph import connected_components
-
-    n = len(vertices)
-    pairs = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(n, n))
-    count, group = connected_components(pairs, directed=False)
-    join = csr_array((np.ones(n), (group, np.arange(n))), shape=(count, n))
-    stretch, area = _stretch(vertices, triangles)
-    joined = (join @ stretch @ join.T).tocsr()
-    sums = np.zeros(count)
-    np.add.at(sums, group, area)
-    sums = np.maximum(sums, 1e-3 * sums.mean())
-    return Spread(join, sums, joined @ diags_array(1.0 / sums) @ joined)
-
-
-def _stretch(vertices: Floats, triangles: Ints) -> tuple[Any, Floats]:
-    """(n, n) sparse stretching energy with cotangent weights, and the (n,) area of each vertex."""
-    from scipy.sparse import coo_array, diags_array
-
-    n = len(vertices)
-    pairs, weights = [], []
-    for k in range(3):
-        apex, a, b = (triangles[:, (k + j) % 3] for j in range(3))
-        u, v = vertices[a] - vertices[apex], vertices[b] - vertices[apex]
-        cross = np.linalg.norm(np.cross(u, v), axis=1)
-        pairs.append(np.stack([a, b]))
-        weights.append(0.5 * np.einsum("ij,ij->i", u, v) / np.maximum(cross, 1e-12))
-    area = np.zeros(n)
-    np.add.at(area, triangles.ravel(), np.repeat(cross / 6.0, 3))
-    a, b = np.concatenate(pairs, axis=1)
-    graph = coo_array((np.concatenate(weights), (a, b)), shape=(n, n)).tocsr()
-    graph = (graph + graph.T).tocoo()
-    values = np.clip(graph.data, FLATTEST * np.median(np.abs(graph.data)), 50.0)
-    graph = coo_array((values, graph.coords), shape=(n, n)).tocsr()
-    return diags_array(np.asarray(graph.sum(axis=1)).ravel()) - graph, area
+    join, triangles = surface.place_sums, surface.triangles
+    corners = surface.vertices[triangles]
+    links, area = cotangents(corners, np.ones(len(triangles)), triangles, surface.vertex_count)
+    links.data = np.clip(links.data, FLATTEST * np.median(np.abs(links.data)), STEEPEST)
+    stretch = (join @ laplacian(links) @ join.T).tocsr()
+    area = join @ area
+    area = np.maximum(area, SMALLEST * float(area.mean()))
+    return Spread(join, area, stretch @ diags_array(1.0 / area) @ stretch)

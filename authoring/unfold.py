@@ -70,16 +70,13 @@ def _around(mean: Any, vertices: Ints) -> Bools:
 def _neighbours(skin: Surface) -> tuple[Any, Any]:
     """(n, n) sparse mean over the neighbours of each vertex, and (m, n) sums over its copies along seams."""
     from scipy.sparse import coo_array, csr_array, diags_array
-    from scipy.sparse.csgraph import connected_components
 
-    n, links = skin.vertex_count, skin.links
-    pairs = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(n, n))
-    count, group = connected_components(pairs, directed=False)
-    same = csr_array((np.ones(n), (group, np.arange(n))), shape=(count, n))
+    same = skin.place_sums
+    count, n = same.shape
     edges = coo_array((np.ones(len(skin.edges)), (skin.edges[:, 0], skin.edges[:, 1])), shape=(n, n))
     joined = (same @ (edges + edges.T) @ same.T).tocoo()
     apart = joined.row != joined.col
     graph = csr_array((np.ones(int(apart.sum())), (joined.row[apart], joined.col[apart])), shape=(count, count))
     each = diags_array(1.0 / np.maximum(np.asarray(graph.sum(axis=1)).ravel(), 1.0)) @ graph
-    copies = diags_array(1.0 / np.asarray(same.sum(axis=1)).ravel()) @ same
+    copies = diags_array(1.0 / np.bincount(skin.places)) @ same
     return same.T @ each @ copies, same

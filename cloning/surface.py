@@ -79,17 +79,30 @@ class Surface:
         return unit
 
     @cached_property
-    def seam_mean(self) -> Any:
-        """(n, n) sparse: the mean over the copies of a vertex along a seam; the identity elsewhere."""
-        from scipy.sparse import coo_array, csr_array, diags_array
+    def places(self) -> Ints:
+        """(n,) number of the place of each vertex; copies along a seam share one."""
+        from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
         n = self.vertex_count
         pairs = coo_array((np.ones(len(self.links)), (self.links[:, 0], self.links[:, 1])), shape=(n, n))
-        _, group = connected_components(pairs, directed=False)
-        sums = csr_array((np.ones(n), (group, np.arange(n))))
-        counts = np.bincount(group)
-        return sums.T @ (diags_array(1.0 / counts) @ sums)
+        found: Ints = connected_components(pairs, directed=False)[1]
+        return found
+
+    @cached_property
+    def place_sums(self) -> Any:
+        """(m, n) sparse: the sum over the vertices at each place."""
+        from scipy.sparse import csr_array
+
+        return csr_array((np.ones(self.vertex_count), (self.places, np.arange(self.vertex_count))))
+
+    @cached_property
+    def seam_mean(self) -> Any:
+        """(n, n) sparse: the mean over the copies of a vertex along a seam; the identity elsewhere."""
+        from scipy.sparse import diags_array
+
+        sums = self.place_sums
+        return sums.T @ (diags_array(1.0 / np.bincount(self.places)) @ sums)
 
     @cached_property
     def graph(self) -> Any:
