@@ -13,7 +13,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from authoring.construction import Construction, Offsets
-from authoring.lids import STILL_POINTS, eyeball, keep_clear
+from authoring.lids import STILL_POINTS
+from authoring.on_eyeball import eyeball, keep_clear
 from authoring.riders import in_mesh_units, skin_offsets
 from authoring.spread import spread
 from cloning.bodies import Body, body

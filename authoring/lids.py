@@ -16,14 +16,15 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from authoring.construction import Construction, Offsets
+from authoring.lid_rims import from_rim, rim_line, to_the_corners
+from authoring.on_eyeball import eyeball, keep_clear
 from authoring.riders import carried, in_mesh_units
-from authoring.spread import Spread, spread
+from authoring.spread import Spread, smoothstep, spread
 from authoring.unfold import unfold
-from cloning.eyeballs import Ball, balls
+from cloning.eyeballs import Ball
 from cloning.labels import OPPOSITE
 from cloning.prepare import PreparedFace
-from cloning.rims import EYES, SLICES, Eye, eyes
-from cloning.surface import Surface
+from cloning.rims import EYES, Eye, eyes
 from fba.arrays import Bools, Floats
 from fba.faps import fap
 from fba.fapu import FAPU_DIVISOR
@@ -79,15 +80,9 @@ STILL_POINTS = (
     *(f"9.{k}" for k in (1, 2, 3, 4, 5, 6, 7, 12, 13, 14, 15)),
 )
 
-LAYER = 0.02
-"""A lid clears the ball by no more than this, in radii; by less where it is nearer at rest."""
-
 SINKS = 0.6
 """A closed lid gives up this share of the distance by which its rim stands farther out than the other one, so that
 no slit opens between them from below."""
-
-GRAZED = 0.15
-"""Skin that a moving ball only grazes, with less than this share of its radius, is not pushed all its way."""
 
 FARTHEST = np.radians(70.0)
 """A lid turns by less than this."""
@@ -206,7 +201,7 @@ class Lid:
     def _travel(self, value: float) -> Floats:
         """Share of the opening for each of the eye's slices."""
         count = len(self.eye.open)
-        beside = _smoothstep(np.abs(np.linspace(-1.0, 1.0, count + 2)[1:-1]) / BESIDE)
+        beside = smoothstep(np.abs(np.linspace(-1.0, 1.0, count + 2)[1:-1]) / BESIDE)
         closed = value / FAPU_DIVISOR
         travel: Floats = closed * (1.0 + closed**2 * beside * OVERLAP)
         return travel * self._ends(self.eye.lids[self.part].span, value)
@@ -215,7 +210,7 @@ class Lid:
         """Factor of the way at x: less than 1 at both ends of a closing lid."""
         first, last = self.slices[0], self.slices[-1]
         inside = np.minimum(x - first, last - x) / (NEAR_END * (last - first))
-        factor: Floats = 1.0 - SPARE * max(value, 0.0) / FAPU_DIVISOR * (1.0 - _smoothstep(inside))
+        factor: Floats = 1.0 - SPARE * max(value, 0.0) / FAPU_DIVISOR * (1.0 - smoothstep(inside))
         return factor
 
     @property
@@ -275,73 +270,18 @@ def lid(face: PreparedFace, fap_id: int, unit: Offsets | None = None) -> Lid | N
 
 def _lid(face: PreparedFace, fap_id: int) -> Lid | None:
     side, part = LIDS[fap_id]
-    eye = _to_the_corners(eyes(face)[side])
+    eye = to_the_corners(eyes(face)[side])
     ball = eyeball(face, ("3.5", "3.6")[side])
     if eye is None or ball is None:
         return None
     center = ball.center / face.fapu.es0
-    own, other = (_rim_line(eye, k) - center for k in (part, 1 - part))
+    own, other = (rim_line(eye, k) - center for k in (part, 1 - part))
     heights = np.stack([own[:, 1], np.interp(own[:, 0], other[:, 0], other[:, 1])])
     reach = np.stack([np.hypot(*own[:, 1:].T), np.interp(own[:, 0], other[:, 0], np.hypot(*other[:, 1:].T))])
     still = Follow(np.zeros(0), np.zeros(0))
     found = Lid(face, fap_id, eye, part, ball, own[:, 0] + center[0], heights, reach, still, still)
     closing, opening = (_constructed(found, above) for above in (CLOSING, OPENING))
     return replace(found, closing=closing, opening=opening)
-
-
-def keep_clear(face: PreparedFace, ball: Ball, skin: Floats, shift: Floats | float = 0.0) -> None:
-    """Push offsets (n, 3) of the skin forward where it would come nearer to the eyeball than it rests; heights stay.
-
-    Parameters
-    ----------
-    skin : in eye separations; changed in place, where it moves.
-    shift : (3,) by which the ball itself moves, in eye separations.
-    """
-    es0 = face.fapu.es0
-    moved = np.any(skin[ball.vertices] != 0.0, axis=1)
-    vertices = ball.vertices[moved]
-    local = ball.rest[moved] - ball.center
-    place = local + es0 * (skin[vertices] - shift)
-    needed = ball.radius(place) * (1.0 + np.minimum(ball.clearance(local), LAYER))
-    front = np.sqrt(np.maximum(needed**2 - place[:, 0] ** 2 - place[:, 1] ** 2, 0.0))
-    before = (local[:, 2] > 0.0) & (place[:, 2] + es0 * np.max(shift) > 0.0)
-    push = np.where(before, np.maximum(front - place[:, 2], 0.0), 0.0) / es0
-    if np.any(shift):
-        push *= _smoothstep((1.0 - np.hypot(place[:, 0], place[:, 1]) / needed) / GRAZED)
-    skin[vertices, 2] += push
-
-
-def eyeball(face: PreparedFace, pupil: str) -> Ball | None:
-    """The eyeball behind a pupil, 3.5 or 3.6; None where it is no mesh of its own."""
-    place = face.place(pupil)
-    near = [b for b in balls(face) if np.linalg.norm(b.center - place) < 2.0 * float(np.median(b.radii))]
-    return near[0] if near else None
-
-
-def _to_the_corners(eye: Eye | None) -> Eye | None:
-    """The eye with all slices up to where it is narrowest towards each corner.
-
-    Beyond that the lids are grown together, and what looks like a rim is a fold of the skin.
-    """
-    if eye is None:
-        return None
-    opening = eye.heights[0] - eye.heights[1]
-    used = np.zeros(len(opening), dtype=bool)
-    for side in (np.arange(SLICES - 1, -1, -1), np.arange(SLICES - 1, len(opening))):
-        apart = np.append(opening[side] > 0.0, False)
-        side = side[: int(np.argmin(apart))]
-        used[side[: int(np.argmin(opening[side])) + 1]] = True
-    return replace(eye, open=used)
-
-
-def _rim_line(eye: Eye, part: int) -> Floats:
-    """Places (s, 3) along a rim by rising x."""
-    lid = eye.lids[part]
-    heights, edges, shares = lid.rim(lid.rest)
-    used = eye.open & np.isfinite(heights)
-    a, b = (lid.rest[edges[used, k]] for k in range(2))
-    line: Floats = a + shares[used, None] * (b - a)
-    return line
 
 
 def _constructed(lid: Lid, above: float) -> Follow:
@@ -356,7 +296,7 @@ def _corners(lid: Lid) -> tuple[Floats, Floats]:
     """Shares (n,) and their firmness of the skin between the ends of both rims: it closes like a bellows."""
     skin, labels = lid.face.skin, lid.face.labels.values
     shares, firmness = np.zeros(skin.vertex_count), np.zeros(skin.vertex_count)
-    lines = [_rim_line(lid.eye, k) for k in (lid.part, 1 - lid.part)]
+    lines = [rim_line(lid.eye, k) for k in (lid.part, 1 - lid.part)]
     for end in (0, -1):
         own, other = (line[end] for line in lines)
         way = other - own
@@ -392,7 +332,7 @@ def _regions(lid: Lid, above: float) -> tuple[Bools, Bools]:
     skin, labels = lid.face.skin, lid.face.labels.values
     side, part = LIDS[lid.fap_id]
     own = 3 + 2 * side + part
-    away = _from_rim(skin, lid.eye, lid.part)
+    away = from_rim(skin, lid.eye, lid.part, 1.5 * max(BEHIND, OPENING))
     lining = np.einsum("ij,ij->i", skin.normals, skin.vertices - lid.middle) < 0.0
     rest = (away > np.where(lining, BEHIND, above)) | (labels == OPPOSITE[own])
     for key in STILL_POINTS:
@@ -402,18 +342,6 @@ def _regions(lid: Lid, above: float) -> tuple[Bools, Bools]:
     return (away < RIM) & (labels == own) & ~rest, rest
 
 
-def _from_rim(skin: Surface, eye: Eye, part: int) -> Floats:
-    """(n,) distance along the skin from the rim of a lid."""
-    lid = eye.lids[part]
-    heights, edges, shares = lid.rim(lid.rest)
-    used = np.flatnonzero(eye.open & np.isfinite(heights))
-    points = {str(k): (lid.vertices[edges[k]], np.array([1.0 - shares[k], shares[k]])) for k in used}
-    places = {key: weights @ skin.vertices[vertices] for key, (vertices, weights) in points.items()}
-    limit = 1.5 * max(BEHIND, OPENING)
-    away: Floats = replace(skin, points=points, positions=places).distances(points, limit).min(axis=0)
-    return away
-
-
 def _plate(face: PreparedFace) -> Spread:
     if face not in _PLATES:
         _PLATES[face] = spread(face.skin)
@@ -421,12 +349,6 @@ def _plate(face: PreparedFace) -> Spread:
 
 
 _PLATES: WeakKeyDictionary[PreparedFace, Spread] = WeakKeyDictionary()
-
-
-def _smoothstep(t: Floats) -> Floats:
-    t = np.clip(t, 0.0, 1.0)
-    smooth: Floats = t * t * (3.0 - 2.0 * t)
-    return smooth
 
 
 def _construction(fap_id: int, borders: tuple[int, ...]) -> Construction:

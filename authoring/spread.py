@@ -85,3 +85,10 @@ def spread(surface: Surface) -> Spread:
     area = join @ area
     area = np.maximum(area, SMALLEST * float(area.mean()))
     return Spread(join, area, stretch @ diags_array(1.0 / area) @ stretch)
+
+
+def smoothstep(t: Floats) -> Floats:
+    """From 0 at 0 to 1 at 1, without a slope at both ends."""
+    t = np.clip(t, 0.0, 1.0)
+    smooth: Floats = t * t * (3.0 - 2.0 * t)
+    return smooth

@@ -17,7 +17,7 @@ import numpy as np
 from authoring.behind_teeth import inner_side
 from authoring.construction import Construction, Offsets
 from authoring.riders import in_mesh_units
-from authoring.spread import spread
+from authoring.spread import smoothstep, spread
 from cloning.bodies import body
 from cloning.prepare import PreparedFace
 from cloning.surface import Surface, build_surface
@@ -117,7 +117,7 @@ class Tongue:
         """FAP 44: the front bends, the middle keeps its height; a lowered tip draws back behind the teeth."""
         front = np.maximum(self.along - STILL_MIDDLE, 0.0) / (1.0 - STILL_MIDDLE)
         moved = self._bent(way, front, (1.0 - STILL_MIDDLE) * float(self.tip[2] - self.middle[2]))
-        return moved if way[1] > 0.0 else moved - self._back(moved, _smoothstep(front))[:, None] * FORWARD
+        return moved if way[1] > 0.0 else moved - self._back(moved, smoothstep(front))[:, None] * FORWARD
 
     def _back(self, moved: Floats, share: Floats) -> Floats:
         """(n,) how far the tongue draws back so that its front is behind the inner side of the lower teeth."""
@@ -138,7 +138,7 @@ class Tongue:
     def _raised(self, way: Floats) -> Floats:
         """FAP 46: a wave that is highest at the middle and ends at tip and root."""
         share = (1.0 - STILL_MIDDLE - np.abs(self.along)) / (1.0 - 2.0 * STILL_MIDDLE)
-        return self._exact(MIDDLE, _smoothstep(share), way)
+        return self._exact(MIDDLE, smoothstep(share), way)
 
     def _exact(self, key: str, share: Floats, way: Floats) -> Floats:
         """A share of a motion for each vertex, scaled so that a feature point moves wholly."""
@@ -205,7 +205,7 @@ class Tongue:
         local = self.surface.vertices - bottom
         arc = VALLEY * 0.5 * float(left[0] - right[0])
         side, out = np.sign(local[:, 0]), np.abs(local[:, 0])
-        tilt = angle * _smoothstep((self.along + 1.0) / ROLLED) * np.minimum(out / arc, 1.0)
+        tilt = angle * smoothstep((self.along + 1.0) / ROLLED) * np.minimum(out / arc, 1.0)
         chord, beyond = np.minimum(out, arc) * np.sinc(0.5 * tilt / np.pi), np.maximum(out - arc, 0.0)
         across = chord * np.cos(0.5 * tilt) + beyond * np.cos(tilt) - local[:, 1] * np.sin(tilt)
         up = chord * np.sin(0.5 * tilt) + beyond * np.sin(tilt) + local[:, 1] * (np.cos(tilt) - 1.0)
@@ -265,12 +265,6 @@ def _free(face: PreparedFace, surface: Surface) -> Floats:
     firmness = (away < NEAR_POINTS).astype(np.float64)
     firmness[held] = np.inf
     return spread(surface)(np.where(held, 0.0, 1.0), firmness, SMOOTH)
-
-
-def _smoothstep(t: Floats) -> Floats:
-    t = np.clip(t, 0.0, 1.0)
-    smooth: Floats = t * t * (3.0 - 2.0 * t)
-    return smooth
 
 
 def _construction(fap_id: int) -> Construction:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from authoring.eyes import CONSTRUCTIONS, dilate, thrust
-from authoring.lids import eyeball
+from authoring.on_eyeball import eyeball
 from cloning.prepare import PreparedFace
 from fat.build import build_tables
 from fat.conformance import conformance
