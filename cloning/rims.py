@@ -27,6 +27,14 @@ REACH = 0.11
 ROUND = 1.7
 """An opening that is this much larger than an arc's at the same place was not measured between the rims."""
 
+BLUNT = 2.3
+"""The same for the lids that follow: an eye may end so bluntly, and what is left out there would stay open."""
+
+EVEN = (0.5, 0.8)
+"""A rim that goes at least the second share of the way its feature point goes is taken the whole way; one that goes
+less than the first is left as it is. A source may leave a hair of its own slits open at their ends, where a target,
+whose slits are longer or end more bluntly, would show the eyeball."""
+
 NARROW = 0.4
 """Slices that are less open than this share of the middle are left alone."""
 
@@ -200,17 +208,26 @@ class Eye:
         )
 
 
-def eyes(face: PreparedFace) -> list[Eye | None]:
-    """The left and the right eye of a face; None where lids are missing, grown together or too coarse."""
+def eyes(face: PreparedFace, roundest: float = ROUND) -> list[Eye | None]:
+    """The left and the right eye of a face; None where lids are missing, grown together or too coarse.
+
+    Parameters
+    ----------
+    roundest : openings beyond this many times an arc's are not used.
+    """
     clear = np.full(face.skin.vertex_count, np.inf)
     for ball in balls(face):
         clear[ball.vertices] = np.minimum(clear[ball.vertices], ball.clearance(ball.rest - ball.center))
     clear[~np.isfinite(clear)] = FAR
-    return [_eye(face, clear, corners, lids) for corners, lids in EYES]
+    return [_eye(face, clear, corners, lids, roundest) for corners, lids in EYES]
 
 
 def _eye(
-    face: PreparedFace, clear: Floats, corners: tuple[str, str], keys: Sequence[tuple[str, int, int]]
+    face: PreparedFace,
+    clear: Floats,
+    corners: tuple[str, str],
+    keys: Sequence[tuple[str, int, int]],
+    roundest: float,
 ) -> Eye | None:
     surface, labels = face.skin, face.labels
     if any(k not in surface.points for k in (*corners, keys[0][0], keys[1][0])) or keys[0][1] in labels.sealed:
@@ -228,7 +245,7 @@ def _eye(
     middle = opening[SLICES - 1]
     share = np.linspace(-1.0, 1.0, 2 * SLICES + 1)[1:-1]
     with np.errstate(invalid="ignore"):
-        used = (opening > NARROW * middle) & (opening < ROUND * middle * (1.0 - share**2))
+        used = (opening > NARROW * middle) & (opening < roundest * middle * (1.0 - share**2))
     if not middle > 0.0 or used.sum() < SLICES:
         return None
     return Eye((lids[0], lids[1]), heights, used)
@@ -313,12 +330,22 @@ class RimFollower:
             for part in range(2):
                 moving = np.any(source_motion[mine.lids[part].vertices] != 0.0, axis=(0, 2))
                 for k in np.flatnonzero(moving):
-                    travel = mine.travel(part, source_motion[:, k] / self.units[0])
+                    travel = _evened(mine.travel(part, source_motion[:, k] / self.units[0]))
                     if travel.max() > CLOSES:
                         lift = yours.follow(part, motion[:, k] / self.units[1], travel, SPARE)
                         motion[yours.lids[part].vertices, k, 1] += lift * self.units[1]
 
 
+def _evened(travel: Floats) -> Floats:
+    """The travel (s,) of a rim, with what nearly keeps up with the feature point taken as far as it."""
+    middle = float(travel[SLICES - 1])
+    if middle <= 0.0:
+        return travel
+    t = np.clip((travel / middle - EVEN[0]) / (EVEN[1] - EVEN[0]), 0.0, 1.0)
+    even: Floats = travel + t * t * (3.0 - 2.0 * t) * np.maximum(middle - travel, 0.0)
+    return even
+
+
 def rim_follower(source: PreparedFace, target: PreparedFace) -> RimFollower:
     """The follower of a pair of faces."""
-    return RimFollower(eyes(source), eyes(target), (source.fapu.es0, target.fapu.es0))
+    return RimFollower(eyes(source), eyes(target, BLUNT), (source.fapu.es0, target.fapu.es0))

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from fat import AnimatableFace
+from fat import AnimatableFace, FaceDefTables
 from fat.open_jaw import open_jaw_mode
 from fba import FapStream
 from formats import read, read_face, read_scene, write
@@ -460,9 +460,13 @@ def test_json_has_no_numbers_that_json_does_not_know(capsys: pytest.CaptureFixtu
 
 
 def test_faps_that_the_source_cannot_give(tmp_path: Path) -> None:
-    result = fba("clone", sample("faces/tri_head.obj"), "-o", tmp_path / "o.wrl", "--faps", "62-68")
+    face = read_face("default")
+    few = FaceDefTables(tuple(t for t in face.tables if t.fap_id in (3, 19)))
+    source = tmp_path / "few.wrl"
+    write(replace(face, tables=few), source)
+    result = fba("clone", sample("faces/tri_head.obj"), "-o", tmp_path / "o.wrl", "--source", source, "--faps", "62-68")
     refused(result, "no motion of these FAPs")
-    assert list(tmp_path.iterdir()) == []
+    assert list(tmp_path.iterdir()) == [source]
 
 
 def test_outputs_that_would_harm_each_other_are_refused_first(tmp_path: Path) -> None:
