@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cloning.correct import smooth_step
 from cloning.eyeballs import FAR, balls
 from cloning.prepare import PreparedFace
 from cloning.surface import Surface
@@ -341,8 +342,8 @@ def _evened(travel: Floats) -> Floats:
     middle = float(travel[SLICES - 1])
     if middle <= 0.0:
         return travel
-    t = np.clip((travel / middle - EVEN[0]) / (EVEN[1] - EVEN[0]), 0.0, 1.0)
-    even: Floats = travel + t * t * (3.0 - 2.0 * t) * np.maximum(middle - travel, 0.0)
+    keeps_up = smooth_step((travel / middle - EVEN[0]) / (EVEN[1] - EVEN[0]))
+    even: Floats = travel + keeps_up * np.maximum(middle - travel, 0.0)
     return even
 
 
