@@ -79,7 +79,7 @@ def build_skin_map(
     ----------
     scale : (n_t, 3) FAPU ratios in mesh units.
     """
-    refinements, fine, fine_labels = _refined(source, source_labels.values, target)
+    refinements, fine, fine_labels = refined(source, source_labels.values, target)
     moved = align(source, target, target_labels.values)
     labels = target_labels.values
 
@@ -94,10 +94,7 @@ def build_skin_map(
     spacing = np.einsum("nk,nk->n", places.weights, _spacing(fine)[fine.triangles[places.triangles]])
     extra = edge_samples(moved, normals, target.edges, labels, spacing)
     more = _find(extra.points, extra.normals, labels[extra.owners], fine, fine_labels)
-    unmatched = (places.distances > FARTHEST) | (places.facing < LEAST_FACING)
-    if 1 in target_labels.sealed:
-        width = float(np.linalg.norm(target.positions["8.3"] - target.positions["8.4"]))
-        unmatched = unmatched | (target_labels.seam < SEAM_BAND * width)
+    unmatched = (places.distances > FARTHEST) | (places.facing < LEAST_FACING) | sealed_band(target, target_labels)
     matrix = _matrix(places, more, extra.owners, unmatched, fine)
     if len(target.links):
         matrix = (target.seam_mean @ matrix).tocsr()
@@ -105,6 +102,15 @@ def build_skin_map(
     edges = np.concatenate([target.edges, target.links])
     fill = HarmonicFill(target.vertices, edges, unmatched)
     return SkinMap(refinements, matrix, scale, fill, unmatched, places.distances)
+
+
+def sealed_band(target: Surface, labels: Labels) -> Bools:
+    """(n,) bool, skin between lips that are grown together: it stretches and has no partner."""
+    if 1 not in labels.sealed:
+        return np.zeros(target.vertex_count, bool)
+    width = float(np.linalg.norm(target.positions["8.3"] - target.positions["8.4"]))
+    band: Bools = labels.seam < SEAM_BAND * width
+    return band
 
 
 def _find(points: Floats, normals: Floats, labels: Ints, fine: Surface, fine_labels: Ints) -> Places:
@@ -138,7 +144,7 @@ def _spacing(surface: Surface) -> Floats:
     return spacing
 
 
-def _refined(source: Surface, labels: Ints, target: Surface) -> tuple[tuple[Refinement, ...], Surface, Ints]:
+def refined(source: Surface, labels: Ints, target: Surface) -> tuple[tuple[Refinement, ...], Surface, Ints]:
     """Subdivide the source until its edges in the face are about as short as the target's."""
     steps: list[Refinement] = []
     while _face_spacing(source) > COARSER * _face_spacing(target) and source.vertex_count * 4 <= MOST_VERTICES:
