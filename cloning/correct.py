@@ -103,8 +103,8 @@ class Correction:
         size = np.linalg.norm(motion, axis=2)
         largest = np.maximum(size.max(axis=0), np.linalg.norm(goals, axis=2).max(axis=0))
         limit = np.maximum(ACTIVE * largest, 1e-300)
-        active = smooth_step(size / limit)
-        wanted = smooth_step(np.linalg.norm(goals, axis=2) / limit)
+        active = _smooth_step(size / limit)
+        wanted = _smooth_step(np.linalg.norm(goals, axis=2) / limit)
         for point in range(len(self.ids)):
             column = self.bumps[:, [point]].tocoo()
             rows, height = column.coords[0], column.data
@@ -124,7 +124,7 @@ def _solve(normal: Floats, right: Floats, ridge: float, size: float) -> Floats:
         ridge *= 10.0
 
 
-def smooth_step(t: Floats) -> Floats:
+def _smooth_step(t: Floats) -> Floats:
     """0 below 0, 1 above 1, and level at both ends."""
     t = np.clip(t, 0.0, 1.0)
     smooth: Floats = t * t * (3.0 - 2.0 * t)
