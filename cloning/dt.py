@@ -129,7 +129,7 @@ class DeformedTransfer:
             self.fitted,
             skin.triangles,
             np.where(reach == 0.0, RESTING, MOVING),
-            self._rows(),
+            self.goal_rows(),
             POINT_WEIGHT,
             skin.links,
         )
@@ -154,12 +154,19 @@ class DeformedTransfer:
     def carry(self, values: Floats) -> Floats:
         return self.skin_map.carry(values)
 
-    def _rows(self) -> Any:
-        """(k, n) sparse: the target's feature points, by way of the map, on the source's vertices."""
+    def goal_rows(self) -> Any:
+        """(k, n) sparse: feature points on the source's vertices.
+
+        Those of the target, by way of the map; the source's own where the target's have no partner.
+        """
+        from scipy.sparse import diags_array
+
         rows = self.target.skin.point_matrix(self.ids) @ self.skin_map.matrix
+        matched = np.asarray(rows.sum(axis=1)).ravel() > 1.0 - 1e-6
         for step in reversed(self.skin_map.refinements):
             rows = rows @ step.matrix
-        return rows.tocsr()
+        own = self.source.skin.point_matrix(self.ids)
+        return (diags_array(matched.astype(float)) @ rows + diags_array((~matched).astype(float)) @ own).tocsr()
 
 
 @dataclass(frozen=True, eq=False)

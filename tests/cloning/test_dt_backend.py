@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from remade import bare
+from scipy.sparse import diags_array
 from scipy.spatial import cKDTree
 
 from cloning import clone_with_report
@@ -105,6 +106,19 @@ def test_skin_that_rests_in_the_source_rests_in_the_target(
         far = matched & (away > 0.6)
         assert far.any()
         assert not found[far, k].any()
+
+
+def test_feature_points_without_a_partner_have_their_goal_at_the_source_s_own_place(
+    mine: PreparedFace, yours: PreparedFace, transfer: DeformedTransfer
+) -> None:
+    lost = transfer.ids.index("9.3")
+    away = np.ones(yours.skin.vertex_count)
+    away[yours.skin.points["9.3"][0]] = 0.0
+    holed = replace(transfer.skin_map, matrix=(diags_array(away) @ transfer.skin_map.matrix).tocsr())
+    rows = replace(transfer, skin_map=holed).goal_rows()
+    assert np.allclose(rows.sum(axis=1), 1.0)
+    own = mine.skin.point_matrix(["9.3"]).toarray()[0]
+    assert np.array_equal(rows.toarray()[lost], own)
 
 
 def test_each_motion_comes_out_the_same_in_any_company(transfer: DeformedTransfer, motions: Floats) -> None:
