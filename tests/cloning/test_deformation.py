@@ -209,6 +209,21 @@ def test_seams_do_not_open_and_change_nothing() -> None:
     assert np.allclose(parts.apply(motion[of]), whole[of], atol=1e-9)
 
 
+def test_a_part_that_never_rests_is_placed_by_faint_wishes() -> None:
+    source, triangles = sheet(8, 20)
+    target = sheet(8, 21)[0] * np.array([1.5, 1.0, 0.7])
+    n = len(source)
+    both = np.concatenate([source, source + 5.0])
+    places = np.concatenate([target, target + 5.0])
+    cells = np.concatenate([triangles, triangles + n]).astype(np.int32)
+    motion = np.concatenate([offsets(source, 1, 22), np.full((n, 1, 3), 0.2)])
+    held = np.where(motion.any(axis=(1, 2)), 1e-3, 1.0)
+    found = deformation_transfer(both, places, cells, held).apply(motion, wishes=1.5 * motion)
+    assert np.allclose(found[n:], 0.3, atol=1e-9)
+    alone = deformation_transfer(source, target, triangles, held[:n]).apply(motion[:n], wishes=1.5 * motion[:n])
+    assert np.allclose(found[:n], alone, atol=1e-9)
+
+
 def test_triangles_without_a_plane_are_left_out() -> None:
     source, triangles = sheet(8, 15)
     motion = offsets(source, 1, 16)
