@@ -59,14 +59,17 @@ def _build(source: PreparedFace, target: PreparedFace) -> DeformedTransfer:
     places = correspond(surface, fine.triangles, target.skin, labels=(fine_labels, labels[1]))
     unmatched = ~places.valid | sealed_band(target.skin, target.labels)
     skin_map = _skin_map(target.skin, refinements, places.matrix(), unmatched, places.residual)
+    ids = tuple(anchor_ids(source.skin, target.skin))
+    points = np.array([source.skin.positions[i] for i in ids])
     return DeformedTransfer(
         source,
         target,
         fitted.vertices,
         skin_map,
-        tuple(anchor_ids(source.skin, target.skin)),
+        ids,
+        blend(source.skin.vertices, points, ratios(source.fapu, target.fapu, ids) / target.fapu.es0),
         _measures(skin_map),
-        {"point_weight": POINT_WEIGHT, "refinements": len(refinements)},
+        {"point_weight": POINT_WEIGHT, "moving_weight": MOVING, "most": MOST, "refinements": len(refinements)},
     )
 
 
@@ -109,6 +112,7 @@ class DeformedTransfer:
     fitted : (n, 3) the source's skin in the target's place, eye separations of the target.
     skin_map : from the source's vertices to the target's.
     ids : feature points that have goals.
+    scale : (n, 3) FAPU ratios around each of the source's vertices, from its mesh unit to the target's eye separations.
     solver : None until the resting vertices are known.
     """
 
@@ -117,6 +121,7 @@ class DeformedTransfer:
     fitted: Floats
     skin_map: SkinMap
     ids: tuple[str, ...]
+    scale: Floats
     measures: Mapping[str, float]
     parameters: Mapping[str, float | str | bool]
     solver: DeformationTransfer | None = None
@@ -138,17 +143,14 @@ class DeformedTransfer:
     def apply(self, motions: Floats) -> Floats:
         if self.solver is None:
             return self.anchored(_reach(motions)).apply(motions)
-        skin, unit = self.source.skin, self.target.fapu.es0
-        scale = ratios(self.source.fapu, self.target.fapu, self.ids)
-        places = np.array([skin.positions[i] for i in self.ids])
-        wishes = motions * (blend(skin.vertices, places, scale) / unit)[:, None]
-        at_points = (skin.point_matrix(self.ids) @ _flat(motions)).reshape(len(self.ids), -1, 3)
-        goals = at_points * (scale / unit)[:, None]
-        deformed = self.solver.apply(motions / self.source.fapu.es0, wishes, goals)
+        source, target = self.source, self.target
+        wishes = motions * self.scale[:, None]
+        at_points = (source.skin.point_matrix(self.ids) @ _flat(motions)).reshape(len(self.ids), -1, 3)
+        goals = at_points * ratios(source.fapu, target.fapu, self.ids)[:, None] / target.fapu.es0
+        deformed = self.solver.apply(motions / source.fapu.es0, wishes, goals)
         carried = self.carry(_flat(deformed)).reshape(-1, *motions.shape[1:])
-        most = MOST * self.carry(np.linalg.norm(wishes, axis=2))
-        size = np.maximum(np.linalg.norm(carried, axis=2), 1e-300)
-        carried *= (unit * np.minimum(most / size, 1.0))[:, :, None]
+        most = MOST * self.carry(_lengths(wishes))
+        carried *= (target.fapu.es0 * np.minimum(most / np.maximum(_lengths(carried), 1e-300), 1.0))[:, :, None]
         return carried
 
     def carry(self, values: Floats) -> Floats:
@@ -205,8 +207,15 @@ class PublishedDeformation:
 
 def _reach(motions: Floats) -> Floats:
     """(n,) the farthest that any of (n, K, 3) offsets moves each vertex."""
-    farthest: Floats = np.linalg.norm(motions, axis=2).max(axis=1, initial=0.0)
+    farthest: Floats = _lengths(motions).max(axis=1, initial=0.0)
     return farthest
+
+
+def _lengths(offsets: Floats) -> Floats:
+    """(n, K) lengths of (n, K, 3) offsets."""
+    squared = np.einsum("nkd,nkd->nk", offsets, offsets)
+    lengths: Floats = np.sqrt(squared)
+    return lengths
 
 
 def _flat(offsets: Floats) -> Floats:
