@@ -6,7 +6,7 @@ every face. So the standard's words ("corner", "lowest point") mean on a target 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,9 +22,16 @@ FARTHEST = 0.16
 """An edge farther than this from the guess is another one (a crease, the teeth), in eye separations."""
 
 STEP = 0.008
-"""Distance of the slices between which a corner is sought, in eye separations: 2 % of an eye's width."""
+"""Distance of the slices in which an opening is followed, in eye separations: 2 % of an eye's width."""
 
-Line = Callable[[float], float]
+NEAR = 0.05
+"""An edge is at most this much higher or lower than in the slice before, in eye separations."""
+
+GAP = 2
+"""Slices without an opening that are passed over: a lid or lip may touch the other one."""
+
+CORNER = 0.3
+"""A corner farther from the guess than this is the end of something else, in eye separations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,74 +136,68 @@ def _profile(skin: Surface, guess: Mapping[str, Floats]) -> dict[str, Floats]:
 def _opening(skin: Surface, guess: Mapping[str, Floats], opening: Opening) -> dict[str, Floats]:
     """Edges and corners of one opening; nothing where it is grown together."""
     ids = [opening.left, opening.right, opening.upper, opening.lower]
-    ids += [i for pair in opening.quarters for i in pair]
     places = np.array([guess[i] for i in ids])
-    slicer = Slicer(skin, places.min(axis=0) - 0.4, places.max(axis=0) + 0.4)
-    upper, lower = _edges(guess, opening)
-
-    def edges(x: float) -> tuple[Floats, Floats] | None:
-        cut = slicer.at(x)
-        above, below = upper(x), lower(x)
-        top = cut.edge(above + MARGIN, True, below - FARTHEST)
-        bottom = cut.edge(below - MARGIN, False, above + FARTHEST)
-        if top is None or bottom is None:
-            return None
-        if abs(top[0] - above) > FARTHEST or abs(bottom[0] - below) > FARTHEST:
-            return None
-        return np.array([x, *top]), np.array([x, *bottom])
-
+    slicer = Slicer(skin, places.min(axis=0) - 0.5, places.max(axis=0) + 0.5)
     middle = float(guess[opening.upper][0])
-    pair = edges(middle)
-    if pair is None:
+    start = _edges(slicer, middle, float(guess[opening.upper][1]), float(guess[opening.lower][1]), FARTHEST)
+    if start is None:
         return {}
-    found = {opening.upper: pair[0], opening.lower: pair[1]}
-    for corner, quarter in zip((opening.left, opening.right), opening.quarters or ((), ()), strict=True):
-        end = _corner(edges, middle, float(guess[corner][0]))
-        if end is None:
-            continue
-        found[corner] = end
-        if quarter and (pair := edges(0.5 * (middle + float(end[0])))) is not None:
-            found.update(zip(quarter, pair, strict=True))
+    ways = [_followed(slicer, start, float(guess[corner][0]) - middle) for corner in (opening.left, opening.right)]
+    found: dict[str, Floats] = {}
+    for corner, way in zip((opening.left, opening.right), ways, strict=True):
+        end = _end(way)
+        if abs(float(end[0] - guess[corner][0])) < CORNER:
+            found[corner] = end
+    whole = [*reversed(ways[1]), *ways[0][1:]]
+    if not opening.quarters:
+        # The middle of a lid is half way between its corners.
+        middle = 0.5 * float(whole[0][0][0] + whole[-1][0][0])
+    found[opening.upper], found[opening.lower] = _at(whole, middle)
+    for corner, quarter in zip((opening.left, opening.right), opening.quarters, strict=False):
+        if corner in found:
+            found.update(zip(quarter, _at(whole, 0.5 * (middle + float(found[corner][0]))), strict=True))
     return found
 
 
-def _corner(edges: Callable[[float], tuple[Floats, Floats] | None], middle: float, guess: float) -> Floats | None:
-    """Where the opening ends: the last slice that shows it, from the middle outwards."""
-    way = guess - middle
-    last = None
-    closed = 0
-    for share in np.arange(0.6, 1.4, STEP / max(abs(way), STEP)):
-        pair = edges(middle + float(share) * way)
-        if pair is not None:
-            # The edge in front: the other one may already lie inside.
-            last, closed = 0.5 * (pair[0] + pair[1]), 0
-            last[2] = max(float(pair[0][2]), float(pair[1][2]))
-        elif last is not None:
-            closed += 1
-            if closed > 2:
-                break
-    if last is None or abs(float(last[0]) - guess) > FARTHEST:
+Pair = tuple[Floats, Floats]
+"""Places on the upper and on the lower edge, (3,) each."""
+
+
+def _edges(slicer: Slicer, x: float, above: float, below: float, farthest: float) -> Pair | None:
+    """The edges of an opening in the slice at x, near two heights; None where there is none."""
+    cut = slicer.at(x)
+    top = cut.edge(above + MARGIN, True, below - FARTHEST)
+    bottom = cut.edge(below - MARGIN, False, above + FARTHEST)
+    if top is None or bottom is None or max(abs(top[0] - above), abs(bottom[0] - below)) > farthest:
         return None
-    return last
+    return np.array([x, *top]), np.array([x, *bottom])
 
 
-def _edges(guess: Mapping[str, Floats], opening: Opening) -> tuple[Line, Line]:
-    """Heights of the guessed edges over x."""
-    lines = []
-    for k, middle in enumerate((opening.upper, opening.lower)):
-        ids = [opening.right, middle, opening.left]
-        if opening.quarters:
-            left, right = opening.quarters
-            ids = [opening.right, right[k], middle, left[k], opening.left]
-        knots = np.array(sorted(tuple(guess[i][:2]) for i in ids))
-        lines.append(_line(knots, curved=not opening.quarters))
-    return lines[0], lines[1]
+def _followed(slicer: Slicer, start: Pair, way: float) -> list[Pair]:
+    """Follow an opening from its middle to one side, slice by slice, as long as it is there."""
+    found = [start]
+    closed = 0
+    for x in float(start[0][0]) + np.sign(way) * np.arange(STEP, 2.0 * abs(way), STEP):
+        pair = _edges(slicer, float(x), float(found[-1][0][1]), float(found[-1][1][1]), NEAR)
+        closed = closed + 1 if pair is None else 0
+        if closed > GAP:
+            break
+        if pair is not None:
+            found.append(pair)
+    return found
 
 
-def _line(knots: Floats, curved: bool) -> Line:
-    """Height over x through knots (k, 2): straight between them, or the parabola through three."""
-    if not curved:
-        return lambda x: float(np.interp(x, knots[:, 0], knots[:, 1]))
-    curve = np.polynomial.Polynomial.fit(knots[:, 0], knots[:, 1], 2)
-    low, high = knots[0, 0], knots[-1, 0]
-    return lambda x: float(curve(np.clip(x, low, high)))
+def _end(way: list[Pair]) -> Floats:
+    """The corner: the middle of the last two edges, as far in front as the one in front."""
+    upper, lower = way[-1]
+    end: Floats = 0.5 * (upper + lower)
+    end[2] = max(float(upper[2]), float(lower[2]))
+    return end
+
+
+def _at(whole: list[Pair], x: float) -> Pair:
+    """The edges at one x, between slices."""
+    upper, lower = np.array([u for u, _ in whole]), np.array([p for _, p in whole])
+    order = np.argsort(upper[:, 0])
+    places = [np.array([x, *(np.interp(x, edge[order, 0], edge[order, k]) for k in (1, 2))]) for edge in (upper, lower)]
+    return places[0], places[1]

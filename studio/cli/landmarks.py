@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from studio.cli.arguments import AsJson
+from studio.cli.outcome import usage
 from studio.cli.outputs import check_outputs
 
 
@@ -27,7 +28,7 @@ def landmarks(
     as_json: AsJson = False,
 ) -> None:
     """Find the feature points of a face: any axes, any unit, anywhere in the file."""
-    from cloning.detect import detect_points
+    from cloning.detect import DETECTORS, detect_points
     from cloning.prepare import prepare
     from fba.orientation import orient
     from formats import read, read_face
@@ -37,6 +38,8 @@ def landmarks(
     from studio.landmark_sheet import landmark_sheet
     from studio.sheet import save_png
 
+    if detector not in DETECTORS:
+        usage(f"--detector {detector}: choose {' or '.join(DETECTORS)}")
     check_outputs(output, None, sheet, inputs=(face, given))
     known = read_face(source)
     scene = scene_of(read(face))

@@ -30,7 +30,7 @@ from studio.cli.arguments import parse_faps
 from studio.cli.console import print_json
 from studio.cli.outcome import Outcome
 
-VERBS = ("demo", "inspect", "clone", "author", "export", "play", "check", "doctor")
+VERBS = ("demo", "inspect", "landmarks", "clone", "author", "export", "play", "check", "doctor")
 
 
 def fba(*words: object) -> Result:
