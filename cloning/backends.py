@@ -95,3 +95,4 @@ def find_backend(name: str) -> Backend:
 
 register_backend(Backend("fmc", "Facial Motion Cloning (Pandzic 2001)", "cloning.fmc"))
 register_backend(Backend("dt", "Elastic template and deformation transfer (Xiang et al. 2008)", "cloning.dt"))
+register_backend(Backend("fit", "elastic template and FAPU-scaled displacements", "cloning.fit"))

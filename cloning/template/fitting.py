@@ -1,23 +1,25 @@
 """Fit a face's skin onto another face: the elastic template of Xiang et al. (2008), section 3.2.
 
 Two schedules. `PUBLISHED` holds the paper's weights: in eye separations a pure membrane, which leaves cusps at the
-landmarks. `BENDING` is ruled by bending, each step from the last one, so that large smooth deformations cost little.
+landmarks, and each step's result is the next one's rest shape. `BENDING` is ruled by bending and elastic: it starts
+from a spline through the landmarks and remembers that start, so that skin slides no farther than it must.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from cloning.align import anchor_ids
+from cloning.align import anchor_ids, warp_by_points
 from cloning.locate import Places
 from cloning.similarity import fit_similarity
 from cloning.surface import Surface
 from cloning.template.closest import TriangleSearch
 from cloning.template.energies import elastic
+from cloning.template.landmarks import landmarks_of
 from cloning.visibility import visible as visible_vertices
 from fba.arrays import Bools, Floats, Ints
 
@@ -33,6 +35,9 @@ LOOSE = 1e-9
 LEAST_LANDMARKS = 4
 """With fewer the template starts where it is."""
 
+LEAST_ANCHORS = 12
+"""With fewer a spline of space would bend where nothing is known; a similarity starts the fit."""
+
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
@@ -43,10 +48,11 @@ class Schedule:
     k_s, k_b : membrane and bending, first and last.
     k_m : landmarks; of their mean squared distance, or with `by_area` of that times the area around each.
     k_c : closest points, integrated over the skin, from the first step after the `alone` steps to the last.
-    steps : solves; each starts from the last one's result.
+    steps : solves; each finds closest points from the last one's result.
     alone : first steps without closest points: landmarks come first.
     even : weights change by the same factor from step to step, not by the same amount.
     by_area : see `k_m`.
+    remembers : energies count from the start, not from the last step: the fit is elastic, it does not flow.
     """
 
     k_s: tuple[float, float]
@@ -57,6 +63,7 @@ class Schedule:
     alone: int
     even: bool
     by_area: bool
+    remembers: bool
 
     def weights(self, step: int) -> tuple[float, float, float, float]:
         """k_s, k_b, k_m, k_c of one step."""
@@ -72,11 +79,11 @@ class Schedule:
         return first + (last - first) * along
 
 
-PUBLISHED = Schedule((1.0, 1e-3), (1e-9, 1e-12), (200.0, 2000.0), (0.0, 6000.0), 10, 1, even=False, by_area=True)
+PUBLISHED = Schedule((1.0, 1e-3), (1e-9, 1e-12), (200.0, 2000.0), (0.0, 6000.0), 10, 1, False, True, False)
 """The paper's schedule; k_m and k_c are printed as 100 to 1000 and 0 to 3000 and stand in the equation twice."""
 
-BENDING = Schedule((0.2, 2e-3), (1e-3, 1e-6), (1e4, 1e4), (3.0, 300.0), 14, 2, even=True, by_area=False)
-"""Bending rules what is smaller than 0.44 eye separations at first, smaller than 0.14 in the end."""
+BENDING = Schedule((0.05, 5e-4), (1e-2, 1e-4), (1e4, 1e4), (3.0, 300.0), 14, 2, True, False, True)
+"""Bending rules what is smaller than 2.8 eye separations; the membrane keeps the rest from drifting."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +118,10 @@ def fit_template(
     Parameters
     ----------
     landmarks : feature points that are drawn together; None = all that both have, () = none.
-    labels : labels of lips and lids of template and target; a side is never drawn to the opposite one.
+    labels : labels of lips and lids of template and target: a side is never drawn to the opposite one, and the rims
+        of the lids are landmarks.
     visible : (n,) bool, template vertices that look for closest points; None = those seen from outside.
-    start : (n, 3) where the template starts; None = moved by the similarity that suits the landmarks best.
+    start : (n, 3) where the template starts; None = where the landmarks take it.
     progress : called with the share done.
     """
     from scipy.sparse import diags_array
@@ -121,20 +129,20 @@ def fit_template(
     ids = anchor_ids(template, target) if landmarks is None else list(landmarks)
     mine, yours = (None, None) if labels is None else labels
     mesh = _Welded(template)
-    marks = _Landmarks(
-        template.point_matrix(ids) @ mesh.spread,
-        np.array([target.positions[i] for i in ids]).reshape(-1, 3),
-        schedule.by_area,
-    )
+    marks = landmarks_of(template, target, ids, mine)
+    marks = replace(marks, rows=marks.rows @ mesh.spread)
     seen = visible_vertices(template) if visible is None else visible
     search = TriangleSearch(target.vertices, target.triangles, yours)
     pull = _Pull(search, mesh.triangles, mesh.pick(seen), None if mine is None else mesh.pick(mine))
-    current = mesh.pick(_start(template, ids, marks.goals) if start is None else start)
+    current = mesh.pick(_start(template, target, ids, schedule) if start is None else start)
+    rest, even = current, np.full(len(marks.goals), 1.0 / max(len(marks.goals), 1))
     pulled = np.zeros(len(current), bool)
     for step in range(schedule.steps):
         k_s, k_b, k_m, k_c = schedule.weights(step)
-        system, areas = elastic(current, mesh.triangles, k_s, k_b)
-        more, right = marks.term(current, areas, k_m)
+        rest = rest if schedule.remembers else current
+        system, areas = elastic(rest, mesh.triangles, k_s, k_b)
+        more, right = marks.term(current, k_m * (marks.rows @ areas if schedule.by_area else even))
+        right = right - system @ (current - rest)
         if k_c > 0.0:
             pulled, way = pull.ways(current)
             size = np.where(pulled, k_c * areas, 0.0)
@@ -148,10 +156,14 @@ def fit_template(
     return Fitted(mesh.spread @ current, mesh.expand(places.distances), mesh.expand(pulled))
 
 
-def _start(template: Surface, ids: Sequence[str], goals: Floats) -> Floats:
+def _start(template: Surface, target: Surface, ids: Sequence[str], schedule: Schedule) -> Floats:
+    """The template where its landmarks say: by a similarity, and what is to be remembers by a spline of space."""
     if len(ids) < LEAST_LANDMARKS:
         return template.vertices
-    return fit_similarity(np.array([template.positions[i] for i in ids]), goals).apply(template.vertices)
+    if schedule.remembers and len(ids) >= LEAST_ANCHORS:
+        return warp_by_points(template, target, ids)
+    places, goals = (np.array([surface.positions[i] for i in ids]) for surface in (template, target))
+    return fit_similarity(places, goals).apply(template.vertices)
 
 
 class _Welded:
@@ -175,23 +187,6 @@ class _Welded:
     def expand(self, values: Any) -> Any:
         """(n, ...) values, from one for each welded vertex."""
         return values[self.group]
-
-
-@dataclass(frozen=True, eq=False)
-class _Landmarks:
-    """Rows that evaluate a field at the landmarks, (k, n) sparse, and where the landmarks belong, (k, 3)."""
-
-    rows: Any
-    goals: Floats
-    by_area: bool
-
-    def term(self, current: Floats, areas: Floats, k_m: float) -> tuple[Any, Floats]:
-        """What the landmarks add to the system (n, n) and to its right side (n, 3)."""
-        from scipy.sparse import diags_array
-
-        size = k_m * (self.rows @ areas if self.by_area else np.full(len(self.goals), 1.0 / max(len(self.goals), 1)))
-        weighted = self.rows.T @ diags_array(size)
-        return weighted @ self.rows, weighted @ (self.goals - self.rows @ current)
 
 
 class _Pull:

@@ -163,7 +163,7 @@ def test_schedules_run_from_their_first_to_their_last_weights() -> None:
     assert PUBLISHED.weights(0) == pytest.approx((1.0, 1e-9, 200.0, 0.0))
     assert PUBLISHED.weights(9) == pytest.approx((1e-3, 1e-12, 2000.0, 6000.0))
     assert [BENDING.weights(k)[3] for k in range(3)] == pytest.approx([0.0, 0.0, 3.0])
-    assert BENDING.weights(13) == pytest.approx((2e-3, 1e-6, 1e4, 300.0))
+    assert BENDING.weights(13) == pytest.approx((5e-4, 1e-4, 1e4, 300.0))
     steps = np.array([BENDING.weights(k)[1] for k in range(14)])
     assert np.allclose(steps[1:] / steps[:-1], steps[1] / steps[0])
 
@@ -172,8 +172,7 @@ def test_schedules_run_from_their_first_to_their_last_weights() -> None:
 def test_a_template_that_was_turned_scaled_and_moved_comes_back(head: PreparedFace, schedule: Schedule) -> None:
     turn = rotation_matrix((0.3, 1.0, 0.2, 0.5))[:3, :3]
     target = moved(head.skin, lambda v: 1.3 * v @ turn.T + [4.0, -2.0, 1.0])
-    labels = head.labels.values, head.labels.values
-    fitted = fit_template(head.skin, target, labels=labels, schedule=replace(schedule, steps=3))
+    fitted = fit_template(head.skin, target, schedule=replace(schedule, steps=3))
     assert np.abs(fitted.vertices - target.vertices).max() < 1e-6
     assert fitted.residual[fitted.valid].max() < 1e-6
 
@@ -200,7 +199,8 @@ def test_landmarks_and_closest_points_bend_a_sheet_onto_a_wave() -> None:
     target = replace(target, positions=moved(flat, wave).positions)
     seen = np.ones(flat.vertex_count, bool)
     fitted = fit_template(flat, target, list(points), visible=seen)
-    assert fitted.residual.max() < 2e-3, "it lies on the target"
+    assert fitted.residual.max() < 8e-3, "it lies on the target"
+    assert fitted.residual.mean() < 2e-3
     places = list(points.values())
     assert np.abs(fitted.vertices[places] - wave(flat.vertices[places])).max() < 2e-3
     sideways = np.abs(fitted.vertices - wave(flat.vertices))[:, :2]
