@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cloning.detect.register import front, register, stretch, symmetric
+from cloning.detect.register import agreement, front, register, stretch, symmetric
 from cloning.detect.samples import Samples, sample, seen
 from cloning.detect.search import Pose, Template, search
 from cloning.surface import Surface
@@ -35,9 +35,12 @@ GRID = 0.08
 SURE = 0.7
 """Agreement after the quick registration above which no other part of the file is searched; false places reach 0.65."""
 
+ALONE = 5
+"""Pieces that are tried as the whole face: hair, glasses or clothes may show more than the skin."""
+
 SHARE = 0.2
-"""A piece is skin if it shows this share of what the largest one shows: faces cut in halves stay whole, brows and
-lashes fall out."""
+"""Otherwise a piece is skin if it shows this share of what the first one shows: faces cut in halves stay whole, brows
+and lashes fall out."""
 
 BALL = 0.12
 """Largest error of an eyeball as a sphere, as part of its radius: a cornea stands out by about that."""
@@ -178,17 +181,33 @@ def isolate(surface: Surface, pose: Pose, inside_out: bool, model: Model) -> Hea
     near = np.all(np.abs(vertices - (0.0, -0.5, -0.7)) < ROOM, axis=1)
     eyeballs = _eyeballs(whole, piece, near)
     balls = [piece[b.vertices[0]] for b in eyeballs if b is not None]
-    points = sample(whole, SAMPLES, np.flatnonzero(near[whole.triangles].all(axis=1)))
-    ahead = points.subset(seen(points.points, GRID, 0.5 * GRID) & front(points.points))
-    shown = np.bincount(piece[whole.triangles[ahead.triangles, 0]], minlength=int(piece.max()) + 1)
-    shown[balls] = 0
-    kept = np.isin(piece, np.flatnonzero(shown >= SHARE * shown.max())) & near
+    kept = np.isin(piece, _skin_pieces(whole, piece, near, model, balls)) & near
     indices, offsets = whole.polygons
     skin, ids = part(whole, np.minimum.reduceat(kept[indices], offsets[:-1]))
     points = sample(skin, FACE_SAMPLES)
     ahead = points.subset(seen(points.points, GRID, 2.0 * GRID))
     proportions = stretch(model.face, ahead, Pose(np.eye(3), 1.0, np.zeros(3), pose.score), LONG)
     return Head(skin, ids, whole, pose, eyeballs, proportions)
+
+
+def _skin_pieces(whole: Surface, piece: Ints, near: Bools, model: Model, balls: list[Ints]) -> Ints:
+    """The piece that is a face all alone; where there is none, all pieces that show much of it."""
+    owner = piece[whole.triangles[:, 0]]
+    inside = near[whole.triangles].all(axis=1)
+    points = sample(whole, SAMPLES, np.flatnonzero(inside))
+    ahead = points.subset(seen(points.points, GRID, 0.5 * GRID) & front(points.points))
+    shown = np.bincount(owner[ahead.triangles], minlength=int(piece.max()) + 1)
+    shown[balls] = 0
+    here = Pose(np.eye(3), 1.0, np.zeros(3), 0.0)
+    fits = {}
+    for number in np.argsort(-shown, kind="stable")[:ALONE]:
+        if shown[number] > 0:
+            alone = points.subset(owner[points.triangles] == number)
+            fits[int(number)] = float(agreement(model.face, facing(alone, here)[0], here).mean())
+    best = max(fits, key=lambda number: fits[number])
+    if fits[best] > SURE:
+        return np.array([best], np.int32)
+    return np.flatnonzero(shown >= SHARE * shown.max()).astype(np.int32)
 
 
 def _eyeballs(whole: Surface, piece: Ints, near: Bools) -> tuple[Eyeball | None, Eyeball | None]:

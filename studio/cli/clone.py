@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 TargetPath = Annotated[Path, typer.Argument(help="The plain face mesh that shall become animatable.")]
 Out = Annotated[Path, typer.Option("--output", "-o", help="Where to write; the extension chooses the format.")]
-Landmarks = Annotated[Path | None, typer.Option(help="Feature points of the target; default: NAME.fps.json beside it.")]
+Landmarks = Annotated[
+    Path | None, typer.Option(help="Feature points of the target; default: NAME.fps.json beside it, or detected.")
+]
 Shapes = Annotated[
     Path | None,
     typer.Option(help="Clone these morph targets of --source instead: a folder of OBJ, an .npz or a glTF."),
