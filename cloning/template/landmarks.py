@@ -62,7 +62,10 @@ def landmarks_of(template: Surface, target: Surface, ids: Sequence[str], labels:
         return Landmarks(rows, goals)
     sides = np.array([mine[name][0] for name in names])
     search = TriangleSearch(template.vertices, template.triangles, labels)
-    places = search.closest(np.array([mine[name][1] for name in names]), labels=sides)
+    own, theirs = (np.array([anchors[name][1] for name in names]) for anchors in (mine, yours))
+    places = search.closest(own, labels=sides)
     where = (np.repeat(np.arange(len(names)), 3), template.triangles[places.triangles].ravel())
     more = csr_array((places.weights.ravel(), where), shape=(len(names), template.vertex_count))
-    return Landmarks(vstack([rows, more], format="csr"), np.concatenate([goals, [yours[name][1] for name in names]]))
+    # A way along an edge cuts corners by a hair; counted out, so that a face fits itself exactly.
+    theirs = theirs + (more @ template.vertices - own)
+    return Landmarks(vstack([rows, more], format="csr"), np.concatenate([goals, theirs]))
