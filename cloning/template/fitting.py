@@ -195,13 +195,15 @@ class _Pull:
     def __init__(self, search: TriangleSearch, triangles: Ints, seen: Bools, labels: Ints | None) -> None:
         self._search, self._triangles, self._labels = search, triangles, labels
         self._seen = np.flatnonzero(seen)
+        self._last: Ints | None = None
 
     def places(self, current: Floats) -> Places:
         """The closest points on the target of all vertices that look for one."""
         n = len(current)
         normals = vertex_normals(current, self._triangles)[self._seen]
         labels = None if self._labels is None else self._labels[self._seen]
-        found = self._search.closest(current[self._seen], normals, labels, FACING, REACH)
+        found = self._search.closest(current[self._seen], normals, labels, FACING, REACH, self._last)
+        self._last = found.triangles.copy()
         every = Places(np.full(n, -1, np.int32), np.zeros((n, 3)), np.full(n, np.inf), np.full(n, -1.0))
         every.triangles[self._seen], every.weights[self._seen] = found.triangles, found.weights
         every.distances[self._seen], every.facing[self._seen] = found.distances, found.facing

@@ -130,6 +130,8 @@ def test_closest_points_are_those_of_brute_force(facing: float) -> None:
     distances[normals @ search.normals.T < facing] = np.inf
     assert np.allclose(found.distances, distances.min(axis=1), rtol=0, atol=1e-12)
     assert np.allclose(np.linalg.norm(search.positions(found) - points, axis=1), found.distances, atol=1e-9)
+    guessed = search.closest(points, normals, None, facing, guesses=random.integers(-1, 400, 300).astype(np.int32))
+    assert np.array_equal(guessed.distances, found.distances), "guesses change nothing"
     near = search.closest(points, normals, None, facing, reach=0.1)
     assert np.array_equal(near.triangles >= 0, found.distances <= 0.1)
     assert 0 < np.sum(near.triangles >= 0) < 300
