@@ -10,7 +10,7 @@ import numpy as np
 from cloning.detect.confidence import confidences, describe
 from cloning.detect.head import SAMPLES, Head, face_model, facing, find_pose, isolate, part, settle
 from cloning.detect.inside import inner_points
-from cloning.detect.rules import by_rule
+from cloning.detect.rules import OPEN, by_rule
 from cloning.detect.samples import sample
 from cloning.detect.search import Pose
 from cloning.detect.xiang import detect_landmarks
@@ -26,7 +26,7 @@ from fba.errors import LandmarkError
 from fba.feature_points import FeaturePoint, FeaturePoints, feature_point_definitions
 from fba.findings import Finding
 from fba.landmark_checks import pairs
-from fba.scene import FaceScene
+from fba.scene import FaceScene, Role
 
 DETECTORS = ("auto", "xiang")
 
@@ -50,6 +50,8 @@ place points equally well. The first fit is only a guess."""
 UNEVEN = 0.1
 """Points of the two sides that differ by more than this after mirroring, in eye separations, do not both lie right:
 uneven smiles stay below."""
+
+LIDS = (("3.1", "3.3"), ("3.2", "3.4"))
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 
@@ -76,6 +78,14 @@ class Detection:
     points: FeaturePoints
     score: float
     findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Source:
+    """A source's skin, the middle between its pupils at the origin, and which of its vertices are seen."""
+
+    skin: Surface
+    outside: Bools
 
 
 def detect_points(
@@ -105,12 +115,13 @@ def detect_points(
     tell = progress or (lambda stage, share: None)
     tell("searching the face", 0.0)
     skin = _centred(source.skin)
+    model = _Source(skin, _outside(source))
     surface, unit = _whole(scene)
     clicked = {} if given is None else {key: p / unit for key, p in given.positions(scene).items()}
     head = _head(surface, skin, clicked, scene.name)
     known = {key: head.pose.apply(p[None])[0] for key, p in clicked.items()}
     tell("fitting the face", 0.4)
-    places, ruled, residual = _DETECT[detector](head, skin, known)
+    places, ruled, residual = _DETECT[detector](head, model, known)
     tell("placing the points", 0.9)
     trust = confidences(head.pose.score, places, ruled, residual)
     points = _placed(head, surface, skin, places, trust)
@@ -143,17 +154,31 @@ def _head(surface: Surface, skin: Surface, clicked: Mapping[str, Floats], name: 
 
 
 def _auto(
-    head: Head, skin: Surface, known: Mapping[str, Floats]
+    head: Head, source: _Source, known: Mapping[str, Floats]
 ) -> tuple[dict[str, Floats], dict[str, float], dict[str, float]]:
     """Fit the face without landmarks, then rules, then fit the head to what the rules have found."""
-    guess, _ = _fitted(head, _template(skin, FACE), known, FIRST)
+    skin = source.skin
+    guess, _ = _fitted(head, _template(source, FACE), known, FIRST)
     guess = _evened({**guess, **known}, known, _start(head, skin))
     offsets = {key: skin.positions[key] - place for key, place in by_rule(skin, skin.positions).items()}
     ruled = {k: p + offsets[k] for k, p in by_rule(head.skin, guess).items() if k in offsets}
     ruled = {k: p for k, p in ruled.items() if _both_sides(k, ruled) and k not in known}
-    places, residual = _fitted(head, _template(skin, HEAD), {**ruled, **known}, FIT)
+    places, residual = _fitted(head, _template(source, HEAD), {**ruled, **known}, FIT)
     differ = {key: float(np.linalg.norm(place - guess[key])) for key, place in ruled.items()}
-    return _evened({**places, **ruled, **known}, known, guess), differ, residual
+    places = _evened({**places, **ruled, **known}, known, guess)
+    parted = _parted(places, known, _start(head, skin))
+    return {**places, **parted}, differ, {**residual, **dict.fromkeys(parted, LIMITS)}
+
+
+def _parted(
+    places: Mapping[str, Floats], known: Mapping[str, Floats], start: Mapping[str, Floats]
+) -> dict[str, Floats]:
+    """The lids of eyes that were found closed or the wrong way round, where the source's proportions have them."""
+    found = {}
+    for upper, lower in LIDS:
+        if float(places[upper][1] - places[lower][1]) < OPEN:
+            found.update({key: start[key] for key in (upper, lower) if key not in known})
+    return found
 
 
 def _start(head: Head, skin: Surface) -> dict[str, Floats]:
@@ -187,14 +212,18 @@ def _evened(places: Mapping[str, Floats], known: Mapping[str, Floats], near: Map
         )
         if wrong not in known:
             found[wrong] = MIRROR * places[right_one]
+    definitions = feature_point_definitions()
+    for key, place in places.items():
+        if definitions[key].counterpart is None and key not in known and abs(float(place[0])) > UNEVEN:
+            found[key] = place * np.array([0.0, 1.0, 1.0])
     return found
 
 
 def _xiang(
-    head: Head, skin: Surface, known: Mapping[str, Floats]
+    head: Head, source: _Source, known: Mapping[str, Floats]
 ) -> tuple[dict[str, Floats], dict[str, float], dict[str, float]]:
     """The published landmarks, the elastic fit to them, and both once more."""
-    template = _template(skin, HEAD)
+    template = _template(source, HEAD)
     surface = template.surface
     marks = detect_landmarks(surface, _stretched(head, surface), head.skin)
     deformed = _deformed(head, template, {**marks, **known}, FIT)
@@ -204,6 +233,14 @@ def _xiang(
 
 
 _DETECT = {"auto": _auto, "xiang": _xiang}
+
+
+def _outside(source: PreparedFace) -> Bools:
+    """Which of the skin's vertices are seen; eyeballs, teeth and tongue hide what lies behind them."""
+    roles = (Role.EYE_LEFT, Role.EYE_RIGHT, Role.UPPER_TEETH, Role.LOWER_TEETH, Role.TONGUE)
+    names = [s.name for role in roles for s in source.scene.with_role(role)]
+    joined = build_surface(source.scene, FeaturePoints({}), [*source.skin.shapes, *names], source.fapu.es0)
+    return visible(joined)[: source.skin.vertex_count]
 
 
 def _centred(skin: Surface) -> Surface:
@@ -233,14 +270,14 @@ class _Template:
     seen: Bools
 
 
-def _template(skin: Surface, lowest: tuple[float, float]) -> _Template:
+def _template(source: _Source, lowest: tuple[float, float]) -> _Template:
     """What of the source's skin is seen, and what holds feature points: the rest finds no partner.
 
     Parameters
     ----------
     lowest : y and z below which the template ends.
     """
-    seen = visible(skin)
+    skin, seen = source.skin, source.outside
     wanted = seen & np.all(skin.vertices[:, 1:] > lowest, axis=1)
     for vertices, _ in skin.points.values():
         wanted[vertices] = True
@@ -277,7 +314,8 @@ def _fitted(
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     search = TriangleSearch(head.skin.vertices, head.skin.triangles)
     found = search.closest(places, normals, None, 0.3, LIMITS)
-    on = np.where((found.triangles >= 0)[:, None], search.positions(found), places)
+    # Where the target has nothing (the lower jaw of a mask) the source's proportions are the best guess.
+    on = np.where((found.triangles >= 0)[:, None], search.positions(found), rows @ _stretched(head, surface))
     return dict(zip(ids, on, strict=True)), dict(zip(ids, np.minimum(found.distances, LIMITS).tolist(), strict=True))
 
 

@@ -27,6 +27,9 @@ STEP = 0.008
 NEAR = 0.05
 """An edge is at most this much higher or lower than in the slice before, in eye separations."""
 
+OPEN = 0.03
+"""Lids nearer to each other than this, in eye separations, are closed: their edges are no opening. Lips may touch."""
+
 GAP = 2
 """Slices without an opening that are passed over: a lid or lip may touch the other one."""
 
@@ -120,7 +123,9 @@ def _profile(skin: Surface, guess: Mapping[str, Floats]) -> dict[str, Floats]:
         doubt = 0.5 * float(np.ptp(flat))
         share = GUESSED**2 / (GUESSED**2 + doubt**2)
         height = share * heights[best] + (1.0 - share) * near
-        found[key] = np.array([middle, height, np.interp(height, heights, depths)])
+        depth = float(np.interp(height, heights, depths))
+        if np.isfinite(depth):
+            found[key] = np.array([middle, height, depth])
     if "9.3" in found:
         # The corner between nose and upper lip: farthest behind the line from the lip to the tip.
         heights = np.linspace(float(guess["8.1"][1]), float(found["9.3"][1]), 100)
@@ -140,7 +145,7 @@ def _opening(skin: Surface, guess: Mapping[str, Floats], opening: Opening) -> di
     slicer = Slicer(skin, places.min(axis=0) - 0.5, places.max(axis=0) + 0.5)
     middle = float(guess[opening.upper][0])
     start = _edges(slicer, middle, float(guess[opening.upper][1]), float(guess[opening.lower][1]), FARTHEST)
-    if start is None:
+    if start is None or (not opening.quarters and start[0][1] - start[1][1] < OPEN):
         return {}
     ways = [_followed(slicer, start, float(guess[corner][0]) - middle) for corner in (opening.left, opening.right)]
     found: dict[str, Floats] = {}
