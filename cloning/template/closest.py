@@ -64,7 +64,7 @@ class TriangleSearch:
         normals: Floats | None = None,
         labels: Ints | None = None,
         least_facing: float = 0.5,
-        reach: float = np.inf,
+        reach: float | Floats = np.inf,
         guesses: Ints | None = None,
     ) -> Places:
         """Find the closest point of each query.
@@ -75,7 +75,7 @@ class TriangleSearch:
         normals : (m, 3) unit normals; triangles whose own normal is turned away farther than `least_facing` (a
             cosine) do not count. None = all count.
         labels : (m,) labels of the points: triangles that touch the opposite label do not count.
-        reach : nothing farther than this is found.
+        reach : nothing farther than this is found; one for all, or (m,).
         guesses : (m,) a triangle that is likely to be near, -1 for none; it saves time and changes no result.
 
         Returns
@@ -92,7 +92,7 @@ class TriangleSearch:
             refused = np.where(opposite >= 0, 1 << np.maximum(opposite, 0), 0).astype(np.int32)
         query = _Query(self, points, normals, refused, least_facing, best)
         if guesses is not None:
-            guessed = np.flatnonzero(guesses >= 0)
+            guessed = np.flatnonzero(guesses >= 0).astype(np.int32)
             query.offer(guessed, guesses[guessed])
         for count in (FIRST, MORE):
             open_rows = np.flatnonzero(best.triangles < 0)

@@ -29,6 +29,9 @@ FACING = 0.5
 REACH = 0.5
 """Pairs of closest points farther apart than this do not pull, in eye separations."""
 
+HIDDEN_REACH = 0.1
+"""The same for vertices that are hidden from outside: what they belong to may be missing in the target."""
+
 LOOSE = 1e-9
 """Weight of every vertex's own place, against closest points."""
 
@@ -120,7 +123,8 @@ def fit_template(
     landmarks : feature points that are drawn together; None = all that both have, () = none.
     labels : labels of lips and lids of template and target: a side is never drawn to the opposite one, and the rims
         of the lids are landmarks.
-    visible : (n,) bool, template vertices that look for closest points; None = those seen from outside.
+    visible : (n,) bool, template vertices that look for closest points; None = those seen from outside, and hidden
+        ones in their very neighbourhood.
     start : (n, 3) where the template starts; None = where the landmarks take it.
     progress : called with the share done.
     """
@@ -131,9 +135,12 @@ def fit_template(
     mesh = _Welded(template)
     marks = landmarks_of(template, target, ids, mine)
     marks = replace(marks, rows=marks.rows @ mesh.spread)
-    seen = visible_vertices(template) if visible is None else visible
+    if visible is None:
+        reach = np.where(visible_vertices(template), REACH, HIDDEN_REACH)
+    else:
+        reach = np.where(visible, REACH, 0.0)
     search = TriangleSearch(target.vertices, target.triangles, yours)
-    pull = _Pull(search, mesh.triangles, mesh.pick(seen), None if mine is None else mesh.pick(mine))
+    pull = _Pull(search, mesh.triangles, mesh.pick(reach), None if mine is None else mesh.pick(mine))
     current = mesh.pick(_start(template, target, ids, schedule) if start is None else start)
     rest, even = current, np.full(len(marks.goals), 1.0 / max(len(marks.goals), 1))
     pulled = np.zeros(len(current), bool)
@@ -192,9 +199,10 @@ class _Welded:
 class _Pull:
     """Where each vertex of the template is drawn to."""
 
-    def __init__(self, search: TriangleSearch, triangles: Ints, seen: Bools, labels: Ints | None) -> None:
+    def __init__(self, search: TriangleSearch, triangles: Ints, reach: Floats, labels: Ints | None) -> None:
         self._search, self._triangles, self._labels = search, triangles, labels
-        self._seen = np.flatnonzero(seen)
+        self._seen = np.flatnonzero(reach > 0.0)
+        self._reach = reach[self._seen]
         self._last: Ints | None = None
 
     def places(self, current: Floats) -> Places:
@@ -202,7 +210,7 @@ class _Pull:
         n = len(current)
         normals = vertex_normals(current, self._triangles)[self._seen]
         labels = None if self._labels is None else self._labels[self._seen]
-        found = self._search.closest(current[self._seen], normals, labels, FACING, REACH, self._last)
+        found = self._search.closest(current[self._seen], normals, labels, FACING, self._reach, self._last)
         self._last = found.triangles.copy()
         every = Places(np.full(n, -1, np.int32), np.zeros((n, 3)), np.full(n, np.inf), np.full(n, -1.0))
         every.triangles[self._seen], every.weights[self._seen] = found.triangles, found.weights

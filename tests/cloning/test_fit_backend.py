@@ -9,7 +9,6 @@ import pytest
 from remade import bare
 
 from cloning import CloneReport, clone_shapes, clone_with_report
-from cloning.backends import find_backend
 from cloning.mapping import map_skin
 from cloning.prepare import prepare
 from cloning.visibility import visible
@@ -60,17 +59,6 @@ def test_every_vertex_knows_its_place_on_the_source(
     assert np.percentile(away[seen], 95) < 0.08
     tip = prepare(source.scene, source.feature_points, "source").skin.point_matrix(["9.3"])
     assert np.allclose(tip @ yours.places["skin"], 0.0, atol=0.01)
-
-
-def test_carried_fields_are_means_of_the_source_values(
-    source: AnimatableFace, wide: tuple[FaceScene, FeaturePoints]
-) -> None:
-    mine, yours = prepare(*bare(source), "source"), prepare(*wide, "target")
-    transfer = find_backend("fit").build(mine, yours, False)
-    ones = np.ones((mine.skin.vertex_count, 1))
-    assert np.allclose(transfer.carry(ones), 1.0)
-    still = transfer.apply(np.zeros((mine.skin.vertex_count, 2, 3)))
-    assert not still.any()
 
 
 def test_another_topology_moves_nearly_as_its_own_units_say(shared: Path) -> None:
