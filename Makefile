@@ -20,6 +20,7 @@ benchmark: $(VENV)/.installed-test
 	$(BIN)/python -m benchmarks.playback
 	$(BIN)/python -m benchmarks.format_speed
 	$(BIN)/python -m benchmarks.clone_speed
+	$(BIN)/python -m benchmarks.deformation
 	$(BIN)/python -m benchmarks.fidelity --sheets out/fidelity
 
 # Rebuild every shipped face and stream from its origin (needs the package index).

@@ -1,9 +1,11 @@
-"""How faithful Facial Motion Cloning is: measures on faces whose motion is known, and on one whose is not.
+"""How faithful the backends are: measures on faces whose motion is known, and on one whose is not.
 
-    python -m benchmarks.fidelity [--makehuman FOLDER] [--faces FOLDER] [--sheets FOLDER] [--json FILE]
+    python -m benchmarks.fidelity [--backends NAMES] [--makehuman FOLDER] [--faces FOLDER] [--sheets FOLDER]
+                                  [--json FILE]
 
 MakeHuman's source head is cloned onto two other phenotypes, decimated to another topology, where its own units are
-the truth, and onto ICT-FaceKit, where no truth exists. The default mode stands beside the published one.
+the truth (as they are, and scaled by FAPUs), and onto ICT-FaceKit, where no truth exists. Each backend's default mode
+stands beside the published one.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cloning import CloneReport, clone_shapes
+from cloning import CloneReport, backends, clone_shapes
+from cloning.fmc import scale_field
 from cloning.prepare import PreparedFace, prepare
 from cloning.visibility import visible
 from fba.arrays import Floats
@@ -52,25 +55,33 @@ def main() -> None:
     parser.add_argument("--faces", type=Path, default=SHARED)
     parser.add_argument("--sheets", type=Path)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--backends", default=",".join(b.name for b in backends()), help="names, by commas")
     options = parser.parse_args()
     makehuman = open_makehuman(options.makehuman)
     source = known(source_head(makehuman))
     shapes = source.shapes()
     prepared = prepare(source.scene, source.points, "source")
     rows = []
-    print(f"{'target':18}{'mode':12}" + "".join(f"{name:>11}" for name in HEADINGS))
+    print(f"{'target':18}{'mode':16}" + "".join(f"{name:>11}" for name in HEADINGS))
     print_row("source", "itself", own_measures(prepared, shapes))
     for target in targets(makehuman, options.faces):
-        for as_published in (False, True):
-            cloned, report = clone_shapes(
-                source.scene, source.points, shapes, target.scene, target.points, as_published=as_published
-            )
-            row = measure(prepared, shapes, target, cloned, report)
-            mode = "published" if as_published else "default"
-            print_row(target.name, mode, row)
-            rows.append({"target": target.name, "mode": mode, **row})
-            if options.sheets is not None:
-                draw(target, cloned, options.sheets / f"fidelity_{target.name}_{mode}.png")
+        for backend in options.backends.split(","):
+            for as_published in (False, True):
+                cloned, report = clone_shapes(
+                    source.scene,
+                    source.points,
+                    shapes,
+                    target.scene,
+                    target.points,
+                    backend=backend,
+                    as_published=as_published,
+                )
+                row = measure(prepared, shapes, target, cloned, report)
+                mode = f"{backend} published" if as_published else backend
+                print_row(target.name, mode, row)
+                rows.append({"target": target.name, "backend": backend, "published": as_published, **row})
+                if options.sheets is not None:
+                    draw(target, cloned, options.sheets / f"fidelity_{target.name}_{mode.replace(' ', '_')}.png")
     if options.json is not None:
         options.json.write_text(json.dumps(rows, indent=2))
 
@@ -112,12 +123,24 @@ def read_kit_points(path: Path, scene: FaceScene) -> FeaturePoints:
     return FeaturePoints(points)
 
 
-HEADINGS = ("fp_before", "fp_after", "truth", "truth_hid", "lid", "lid_worst", "lip", "flips%", "stretch", "still")
+HEADINGS = (
+    "fp_before",
+    "fp_after",
+    "truth",
+    "fapu_truth",
+    "truth_hid",
+    "lid",
+    "lid_worst",
+    "lip",
+    "flips%",
+    "stretch",
+    "still",
+)
 
 
 def print_row(target: str, mode: str, row: dict[str, float]) -> None:
     cells = "".join(f"{row[h]:11.4f}" if h in row else f"{'-':>11}" for h in HEADINGS)
-    print(f"{target:18}{mode:12}{cells}")
+    print(f"{target:18}{mode:16}{cells}")
 
 
 def own_measures(face: PreparedFace, shapes: ShapeSet) -> dict[str, float]:
@@ -161,6 +184,10 @@ def measure(
         seen = visible(face.skin)
         real = [skin_offsets(face, target.truth, k) for k in range(len(shapes.names))]
         row["truth"] = float(np.mean([relative(b[seen], a[seen]) for a, b in zip(real, yours, strict=True)]))
+        scale = scale_field(source, face)
+        row["fapu_truth"] = float(
+            np.mean([relative(b[seen], (scale * a)[seen]) for a, b in zip(real, yours, strict=True)])
+        )
         row["truth_hid"] = float(np.mean([relative(b[~seen], a[~seen]) for a, b in zip(real, yours, strict=True)]))
     return row
 

@@ -76,6 +76,13 @@ def _apart(anchors: Floats, goals: Floats) -> list[int]:
     return kept
 
 
+def warp_by_points(surface: Surface, target: Surface, ids: Sequence[str]) -> Floats:
+    """(n, 3) vertices of a surface, moved by the spline of space that takes its feature points to a target's."""
+    anchors, goals = (np.array([s.positions[i] for i in ids]) for s in (surface, target))
+    kept = _apart(anchors, goals)
+    return radial_warp(surface.vertices, anchors[kept], goals[kept])
+
+
 def align(source: Surface, target: Surface, labels: Ints) -> Floats:
     """Move the target's vertices into the source's space, side by side of the lips and lids.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Protocol, cast
+from typing import Protocol, cast, runtime_checkable
 
 from cloning.prepare import PreparedFace
 from fba.arrays import Floats
@@ -31,6 +31,15 @@ class SkinTransfer(Protocol):
 
     def carry(self, values: Floats) -> Floats:
         """(n_source, m) values of any field of the skin to (n_target, m), unscaled."""
+        ...
+
+
+@runtime_checkable
+class Anchored(Protocol):
+    """A transfer that wants to know what rests before it carries anything."""
+
+    def anchored(self, reach: Floats) -> SkinTransfer:
+        """The transfer for motions that move each of the source's vertices by (n_source,) mesh units at most."""
         ...
 
 
@@ -85,3 +94,5 @@ def find_backend(name: str) -> Backend:
 
 
 register_backend(Backend("fmc", "Facial Motion Cloning (Pandzic 2001)", "cloning.fmc"))
+register_backend(Backend("dt", "Elastic template and deformation transfer (Xiang et al. 2008)", "cloning.dt"))
+register_backend(Backend("fit", "elastic template and FAPU-scaled displacements", "cloning.fit"))

@@ -14,14 +14,15 @@ from cloning.parts import PUPILS, eye_center
 from cloning.prepare import PreparedFace, prepare
 from cloning.report import CloneReport
 from cloning.source import source_motions, turning_keys
+from cloning.target import target_points
 from cloning.transfer import FaceTransfer, build_face_transfer
 from fat.build import build_tables
 from fat.face import AnimatableFace
 from fat.motion import FaceMotion
-from fat.rig import EYE_FAPS, HEAD_FAPS, rig_eye, rig_head, unrig
+from fat.rig import EYE_FAPS, HEAD_FAPS, rig_eye, rig_head
 from fat.tables import FaceDefTransform
 from fba.arrays import Floats
-from fba.errors import CloningError, LandmarkError
+from fba.errors import CloningError
 from fba.feature_points import FeaturePoints
 from fba.findings import Finding
 from fba.orientation import to_file_order
@@ -86,7 +87,7 @@ def clone_with_report(
     ----------
     source : a face with Facial Animation Tables (what `formats.read` returns for one).
     onto : the target; its vertices, their order, polygons and materials stay as they are.
-    landmarks : feature points of the target; None uses those that `onto` carries.
+    landmarks : feature points of the target; None uses those that `onto` carries, or detects them.
     backend : name of a registered backend.
     as_published : run the paper's own method instead of the repaired default.
     faps : FAP numbers to clone, 1 (visemes) and 2 (expressions) among them; None = all.
@@ -111,8 +112,7 @@ def clone_with_report(
         )
     way = find_backend(backend)
     stages = _Stages(progress, {})
-    scene, points = _target(onto, landmarks)
-    mine, yours, transfer = _build(source.scene, source.feature_points, scene, points, way.name, as_published, stages)
+    mine, yours, transfer = _build(source.scene, source.feature_points, onto, landmarks, way.name, as_published, stages)
     wanted = None if faps is None else frozenset(faps)
     motions, turning = _read_source(source, mine.scene, wanted)
     if not motions and not turning:
@@ -125,7 +125,7 @@ def clone_with_report(
     tables = stages.run("tables", lambda: build_tables(rigged, yours.fapu, cloned, transforms))
     if not len(tables):
         raise CloningError(
-            f"the source '{source.scene.name}' holds no motion of these FAPs that '{scene.name}' can take"
+            f"the source '{source.scene.name}' holds no motion of these FAPs that '{yours.scene.name}' can take"
         )
     face = AnimatableFace(
         rigged,
@@ -161,13 +161,12 @@ def clone_shapes(
     """
     way = find_backend(backend)
     stages = _Stages(progress, {})
-    scene, points = _target(onto, landmarks)
     if shapes.neutral.shape[0] != source.vertex_count:
         raise CloningError(
             f"the morph targets have {shapes.neutral.shape[0]} vertices, but the source '{source.name}' has "
             f"{source.vertex_count}; they must be of the same file"
         )
-    mine, yours, transfer = _build(source, source_points, scene, points, way.name, as_published, stages)
+    mine, yours, transfer = _build(source, source_points, onto, landmarks, way.name, as_published, stages)
     motions = [mine.scene.scatter(mine.scene.frame.from_file(delta)) for delta in shapes.deltas]
     offsets = _carry(transfer, motions, stages)
     rest = {s.name: np.zeros((s.mesh.vertex_count, 3)) for s in yours.scene.shapes}
@@ -176,28 +175,19 @@ def clone_shapes(
     return ShapeSet(shapes.names, neutral, deltas), _report(transfer, way.name, as_published, len(motions), stages, [])
 
 
-def _target(onto: FaceScene | AnimatableFace, landmarks: FeaturePoints | None) -> tuple[FaceScene, FeaturePoints]:
-    if isinstance(onto, AnimatableFace):
-        return unrig(onto), onto.feature_points if landmarks is None else landmarks
-    if landmarks is None:
-        raise LandmarkError(
-            f"'{onto.name}' carries no feature points. Give them as landmarks: a file NAME.fps.json beside the mesh, "
-            "or --landmarks POINTS.json"
-        )
-    return onto, landmarks
-
-
 def _build(
     source: FaceScene,
     source_points: FeaturePoints,
-    target: FaceScene,
-    target_points: FeaturePoints,
+    onto: FaceScene | AnimatableFace,
+    landmarks: FeaturePoints | None,
     backend: str,
     as_published: bool,
     stages: _Stages,
 ) -> tuple[PreparedFace, PreparedFace, FaceTransfer]:
     mine = stages.run("source", lambda: prepare(source, source_points, "source"))
-    yours = stages.run("target", lambda: prepare(target, target_points, "target"))
+    scene, points, found = stages.run("landmarks", lambda: target_points(mine, onto, landmarks))
+    yours = stages.run("target", lambda: prepare(scene, points, "target"))
+    yours = replace(yours, findings=(*found, *yours.findings))
     skin = stages.run("correspondence", lambda: find_backend(backend).build(mine, yours, as_published))
     transfer = stages.run("parts", lambda: build_face_transfer(mine, yours, skin, as_published))
     return mine, yours, transfer

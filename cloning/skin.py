@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -79,25 +80,47 @@ def build_skin_map(
     ----------
     scale : (n_t, 3) FAPU ratios in mesh units.
     """
-    refinements, fine, fine_labels = _refined(source, source_labels.values, target)
+    refinements, fine, fine_labels = refined(source, source_labels.values, target)
     moved = align(source, target, target_labels.values)
-    labels = target_labels.values
 
     def locate(points: Floats) -> tuple[Places, Floats]:
-        found = _find(points, target.normals_of(points), labels, fine, fine_labels)
+        found = find(points, target.normals_of(points), target_labels.values)
         corners = fine.vertices[fine.triangles[found.triangles]]
         return found, np.einsum("nk,nkd->nd", found.weights, corners)
 
+    def find(points: Floats, normals: Floats, labels: Ints) -> Places:
+        return closest(points, normals, labels, fine.vertices, fine.normals, fine.triangles, fine_labels)
+
     fixed = target.point_matrix(anchor_ids(source, target))
     moved, places = settle(target, moved, fixed, locate, FARTHEST, LEAST_FACING)
-    normals = target.normals_of(moved)
+    return map_of_places(refinements, fine, target, target_labels, moved, places, find, scale)
+
+
+def map_of_places(
+    refinements: tuple[Refinement, ...],
+    fine: Surface,
+    target: Surface,
+    target_labels: Labels,
+    moved: Floats,
+    places: Places,
+    find: Callable[[Floats, Floats, Ints], Places],
+    scale: Floats,
+) -> SkinMap:
+    """Make the operator out of the places of a target's vertices on the source.
+
+    Parameters
+    ----------
+    refinements, fine : the source, subdivided; source and target lie on each other.
+    moved : (n_t, 3) the target's vertices in that common place.
+    places : theirs on `fine`.
+    find : gives the places of points, by their normals and labels.
+    scale : (n_t, 3) FAPU ratios in mesh units.
+    """
+    labels = target_labels.values
     spacing = np.einsum("nk,nk->n", places.weights, _spacing(fine)[fine.triangles[places.triangles]])
-    extra = edge_samples(moved, normals, target.edges, labels, spacing)
-    more = _find(extra.points, extra.normals, labels[extra.owners], fine, fine_labels)
-    unmatched = (places.distances > FARTHEST) | (places.facing < LEAST_FACING)
-    if 1 in target_labels.sealed:
-        width = float(np.linalg.norm(target.positions["8.3"] - target.positions["8.4"]))
-        unmatched = unmatched | (target_labels.seam < SEAM_BAND * width)
+    extra = edge_samples(moved, target.normals_of(moved), target.edges, labels, spacing)
+    more = find(extra.points, extra.normals, labels[extra.owners])
+    unmatched = (places.distances > FARTHEST) | (places.facing < LEAST_FACING) | sealed_band(target, target_labels)
     matrix = _matrix(places, more, extra.owners, unmatched, fine)
     if len(target.links):
         matrix = (target.seam_mean @ matrix).tocsr()
@@ -107,8 +130,13 @@ def build_skin_map(
     return SkinMap(refinements, matrix, scale, fill, unmatched, places.distances)
 
 
-def _find(points: Floats, normals: Floats, labels: Ints, fine: Surface, fine_labels: Ints) -> Places:
-    return closest(points, normals, labels, fine.vertices, fine.normals, fine.triangles, fine_labels)
+def sealed_band(target: Surface, labels: Labels) -> Bools:
+    """(n,) bool, skin between lips that are grown together: it stretches and has no partner."""
+    if 1 not in labels.sealed:
+        return np.zeros(target.vertex_count, bool)
+    width = float(np.linalg.norm(target.positions["8.3"] - target.positions["8.4"]))
+    band: Bools = labels.seam < SEAM_BAND * width
+    return band
 
 
 def _matrix(places: Places, more: Places, owners: Ints, unmatched: Bools, fine: Surface) -> Any:
@@ -138,7 +166,7 @@ def _spacing(surface: Surface) -> Floats:
     return spacing
 
 
-def _refined(source: Surface, labels: Ints, target: Surface) -> tuple[tuple[Refinement, ...], Surface, Ints]:
+def refined(source: Surface, labels: Ints, target: Surface) -> tuple[tuple[Refinement, ...], Surface, Ints]:
     """Subdivide the source until its edges in the face are about as short as the target's."""
     steps: list[Refinement] = []
     while _face_spacing(source) > COARSER * _face_spacing(target) and source.vertex_count * 4 <= MOST_VERTICES:

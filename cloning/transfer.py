@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cloning.backends import SkinTransfer
+from cloning.backends import Anchored, SkinTransfer
 from cloning.bind import Binding
 from cloning.bodies import Body, Mover, body, eye_mover, teeth_mover, tongue_mover
 from cloning.correct import Correction, correction
@@ -103,8 +103,9 @@ class FaceTransfer:
         The same for the target; shapes that rest are absent.
         """
         out: list[dict[str, Floats]] = []
+        skin = self.skin.anchored(self._reach(motions)) if isinstance(self.skin, Anchored) else self.skin
         for start in range(0, len(motions), CHUNK):
-            out += self._chunk(motions[start : start + CHUNK])
+            out += self._chunk(skin, motions[start : start + CHUNK])
             if tick is not None:
                 tick(min(start + CHUNK, len(motions)) / len(motions))
         return out
@@ -120,9 +121,16 @@ class FaceTransfer:
         )
         return [Finding("warning", "inexact-points", text, self.target.scene.name)]
 
-    def _chunk(self, motions: Sequence[Offsets]) -> list[dict[str, Floats]]:
+    def _reach(self, motions: Sequence[Offsets]) -> Floats:
+        """(n,) how far the motions move each vertex of the source's skin at most."""
+        farthest = np.zeros(self.source.skin.vertex_count)
+        for motion in motions:
+            np.maximum(farthest, np.linalg.norm(self.source.skin.join(motion), axis=1), out=farthest)
+        return farthest
+
+    def _chunk(self, transfer: SkinTransfer, motions: Sequence[Offsets]) -> list[dict[str, Floats]]:
         moving = np.stack([self.source.skin.join(m) for m in motions], axis=1)
-        skin = self.skin.apply(moving)
+        skin = transfer.apply(moving)
         wanted = self._wanted(moving)
         before = wanted - self._at_points(skin)
         if self.correction is not None:

@@ -50,8 +50,8 @@ def target_points(
     points = points_of(scene, file, landmarks)
     if points is None:
         message = (
-            "no feature points: give --landmarks POINTS.json, or put "
-            f"{file.stem}.fps.json beside the file, to make this face animatable"
+            "no feature points are given: fba clone detects them, fba landmarks shows them; --landmarks POINTS.json "
+            f"or {file.stem}.fps.json beside the file gives them"
         )
         return scene, None, [Finding("info", "no-feature-points", message)]
     scene, points, findings = orient(scene, points)

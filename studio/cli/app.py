@@ -13,6 +13,7 @@ from studio.cli.demo import demo
 from studio.cli.doctor import doctor
 from studio.cli.export import export
 from studio.cli.inspect import inspect
+from studio.cli.landmarks import landmarks
 from studio.cli.outcome import guarded
 from studio.cli.play import play
 
@@ -25,7 +26,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for verb in (demo, inspect, clone, author, export, play, check, doctor):
+for verb in (demo, inspect, landmarks, clone, author, export, play, check, doctor):
     app.command()(guarded(verb))
 
 

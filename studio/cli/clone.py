@@ -13,11 +13,14 @@ from studio.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
     from cloning import CloneReport
+    from fat.face import AnimatableFace
     from fat.open_jaw import Mode
 
 TargetPath = Annotated[Path, typer.Argument(help="The plain face mesh that shall become animatable.")]
 Out = Annotated[Path, typer.Option("--output", "-o", help="Where to write; the extension chooses the format.")]
-Landmarks = Annotated[Path | None, typer.Option(help="Feature points of the target; default: NAME.fps.json beside it.")]
+Landmarks = Annotated[
+    Path | None, typer.Option(help="Feature points of the target; default: NAME.fps.json beside it, or detected.")
+]
 Shapes = Annotated[
     Path | None,
     typer.Option(help="Clone these morph targets of --source instead: a folder of OBJ, an .npz or a glTF."),
@@ -32,7 +35,7 @@ def clone(
     source_landmarks: Annotated[
         Path | None, typer.Option(help="Feature points of --source where it has none of its own.")
     ] = None,
-    backend: Annotated[str, typer.Option(help="How motion is cloned: fmc.")] = "fmc",
+    backend: Annotated[str, typer.Option(help="How motion is cloned: fit, dt or fmc.")] = "fmc",
     as_published: Annotated[
         bool, typer.Option("--as-published", help="Do literally what the paper says, for comparison.")
     ] = False,
@@ -41,6 +44,10 @@ def clone(
     shapes: Shapes = None,
     report: Annotated[Path | None, typer.Option(help="Write measures, warnings and timings as JSON.")] = None,
     sheet: Annotated[Path | None, typer.Option(help="Write a contact sheet (PNG): source above target.")] = None,
+    chessboard: Annotated[
+        Path | None,
+        typer.Option("--map", help="Write a picture of the correspondence (PNG): a chessboard on both faces."),
+    ] = None,
 ) -> None:
     """Clone the motion of an animatable face onto a plain mesh and write an animatable face."""
     from studio.cli.arguments import parse_faps
@@ -49,10 +56,10 @@ def clone(
         wanted = None if faps is None else parse_faps(faps)
     except ValueError as error:
         usage(f"--faps: {error}")
-    check_outputs(output, report, sheet, inputs=(target, landmarks, source_landmarks, shapes))
+    check_outputs(output, report, sheet, inputs=(target, landmarks, source_landmarks, shapes), chessboard=chessboard)
     if shapes is not None:
-        if wanted is not None or sheet is not None or open_jaw is not None:
-            usage("--shapes clones every shape as it is; it does not go with --faps, --open-jaw or --sheet")
+        if wanted is not None or sheet is not None or open_jaw is not None or chessboard is not None:
+            usage("--shapes clones every shape as it is; it does not go with --faps, --open-jaw, --sheet or --map")
         _clone_shapes(target, output, source, landmarks, source_landmarks, shapes, backend, as_published, report)
     else:
         _clone_face(
@@ -67,6 +74,7 @@ def clone(
             open_jaw,
             report,
             sheet,
+            chessboard,
         )
 
 
@@ -82,6 +90,7 @@ def _clone_face(
     open_jaw: Mode | None,
     report: Path | None,
     sheet: Path | None,
+    chessboard: Path | None,
 ) -> None:
     from dataclasses import replace
 
@@ -113,11 +122,21 @@ def _clone_face(
         if sheet is not None:
             tell("drawing", 0.97)
             save_png(contact_sheet(animatable, face, title=face.scene.name), sheet)
+        if chessboard is not None:
+            _draw_map(animatable, face, backend, as_published, chessboard)
         if report is not None:
             _write_report(made, report)
     out = console()
     print_findings((*made.findings, *said, *left_behind(scene_of(found), target, output)), out)
     out.print(f"{output}: {len(face.tables)} tables for {face.scene.vertex_count} vertices")
+
+
+def _draw_map(source: AnimatableFace, target: AnimatableFace, backend: str, as_published: bool, path: Path) -> None:
+    from cloning.mapping import map_skin
+    from studio.chessboard import chessboard
+    from studio.sheet import save_png
+
+    save_png(chessboard(*map_skin(source, target, backend=backend, as_published=as_published)), path)
 
 
 def _clone_shapes(

@@ -30,7 +30,7 @@ from studio.cli.arguments import parse_faps
 from studio.cli.console import print_json
 from studio.cli.outcome import Outcome
 
-VERBS = ("demo", "inspect", "clone", "author", "export", "play", "check", "doctor")
+VERBS = ("demo", "inspect", "landmarks", "clone", "author", "export", "play", "check", "doctor")
 
 
 def fba(*words: object) -> Result:
@@ -295,10 +295,10 @@ def test_unknown_kind_of_file(tmp_path: Path) -> None:
     refused(fba("inspect", path), "face.xyz", "known extensions")
 
 
-def test_a_mesh_without_feature_points(tmp_path: Path) -> None:
+def test_a_mesh_without_a_face(tmp_path: Path) -> None:
     lonely = tmp_path / "lonely.obj"
-    lonely.write_bytes(sample("faces/tri_head.obj").read_bytes())
-    refused(fba("clone", lonely, "-o", tmp_path / "out.wrl"), "feature points", "--landmarks")
+    lonely.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    refused(fba("clone", lonely, "-o", tmp_path / "out.wrl"), "no face was found", "Give the feature points")
     assert not (tmp_path / "out.wrl").exists()
 
 

@@ -1,0 +1,131 @@
+"""Slices through a face at one x: the edges of lips and lids, and the profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cloning.surface import Surface
+from fba.arrays import Floats, Ints
+
+TURN = 0.006
+"""How far a contour must go back up before the edge counts as passed, in eye separations: less is a wrinkle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Slice:
+    """The cut of a surface with a plane x = constant.
+
+    Attributes
+    ----------
+    ends : (s, 2, 2) y and z of both ends of each segment.
+    neighbours : (s, 2) int64, the segment that follows at each end; -1 at a border.
+    """
+
+    ends: Floats
+    neighbours: Any
+
+    def foremost(self, y: float) -> int:
+        """The segment that is seen from the front at this height; -1 if there is none."""
+        low, high = self.ends[:, :, 0].min(axis=1), self.ends[:, :, 0].max(axis=1)
+        here = np.flatnonzero((low <= y) & (y <= high) & (high > low))
+        if not len(here):
+            return -1
+        first, last = self.ends[here, 0], self.ends[here, 1]
+        share = (y - first[:, 0]) / (last[:, 0] - first[:, 0])
+        return int(here[np.argmax(first[:, 1] + share * (last[:, 1] - first[:, 1]))])
+
+    def edge(self, start: float, down: bool, limit: float) -> Floats | None:
+        """Follow the skin from the front at height `start` down (or up) to where it turns inwards.
+
+        Parameters
+        ----------
+        limit : a height; skin that goes on to there has no edge.
+
+        Returns
+        -------
+        (2,) y and z of the edge; None where there is none.
+        """
+        sign = 1.0 if down else -1.0
+        segment = self.foremost(start)
+        if segment < 0:
+            return None
+        end = int(np.argmin(sign * self.ends[segment, :, 0]))
+        best: Floats = self.ends[segment, end]
+        for _ in range(len(self.ends)):
+            place = self.ends[segment, end]
+            if sign * place[0] < sign * best[0]:
+                best = place
+            if sign * best[0] < sign * limit:
+                return None
+            following = int(self.neighbours[segment, end])
+            if sign * (place[0] - best[0]) > TURN or following < 0:
+                return best
+            end = 1 - int(np.flatnonzero(self.neighbours[following] == segment)[0])
+            segment = following
+        return None
+
+    def profile(self, heights: Floats) -> Floats:
+        """z of the foremost skin at each height; nan where there is none."""
+        low, high = self.ends[:, :, 0].min(axis=1), self.ends[:, :, 0].max(axis=1)
+        first, step = self.ends[:, 0], self.ends[:, 1] - self.ends[:, 0]
+        inside = (low[:, None] <= heights) & (heights <= high[:, None]) & (high > low)[:, None]
+        slope = np.divide(step[:, 1], step[:, 0], out=np.zeros(len(step)), where=step[:, 0] != 0)
+        z = np.where(inside, first[:, 1:] + slope[:, None] * (heights - first[:, :1]), -np.inf)
+        found = z.max(axis=0, initial=-np.inf)
+        return np.where(np.isfinite(found), found, np.nan)
+
+
+class Slicer:
+    """Cuts slices through a part of a surface."""
+
+    def __init__(self, surface: Surface, low: Floats, high: Floats) -> None:
+        """Keep the triangles whose bounding boxes reach into a box, given by its two corners (3,)."""
+        corners = surface.vertices[surface.triangles]
+        near = np.all((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low), axis=1)
+        # Seams are closed: both copies of a vertex count as one.
+        self._number = _welded(surface)
+        self._triangles = surface.triangles[near]
+        self._vertices = surface.vertices
+
+    def at(self, x: float) -> Slice:
+        """The slice at one x."""
+        above = self._vertices[self._triangles, 0] > x
+        cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
+        triangles, above = self._triangles[cut], above[cut]
+        # The corner that lies alone on its side; the two edges from it are cut.
+        lone = np.where(above.sum(axis=1) == 1, np.argmax(above, axis=1), np.argmin(above, axis=1))
+        rows = np.arange(len(triangles))
+        ends = np.empty((len(triangles), 2, 2))
+        keys = np.empty((len(triangles), 2), np.int64)
+        for k in range(2):
+            a, b = triangles[rows, lone], triangles[rows, (lone + 1 + k) % 3]
+            va, vb = self._vertices[a], self._vertices[b]
+            share = (x - va[:, 0]) / (vb[:, 0] - va[:, 0])
+            ends[:, k] = va[:, 1:] + share[:, None] * (vb[:, 1:] - va[:, 1:])
+            na, nb = self._number[a], self._number[b]
+            keys[:, k] = np.minimum(na, nb) * len(self._number) + np.maximum(na, nb)
+        return Slice(ends, _joined(keys))
+
+
+def _joined(keys: Any) -> Any:
+    """The segment that shares each end's edge, from (s, 2) int64 numbers of edges; -1 where there is none."""
+    order = np.argsort(keys, axis=None, kind="stable")
+    _, first, count = np.unique(keys.ravel()[order], return_index=True, return_counts=True)
+    # An edge of three triangles goes nowhere certain.
+    a, b = order[first[count == 2]], order[first[count == 2] + 1]
+    found = np.full(keys.size, -1, np.int64)
+    found[a], found[b] = b // 2, a // 2
+    return found.reshape(keys.shape)
+
+
+def _welded(surface: Surface) -> Ints:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = surface.vertex_count
+    links = coo_array((np.ones(len(surface.links)), (surface.links[:, 0], surface.links[:, 1])), shape=(n, n))
+    number: Ints = connected_components(links, directed=False)[1].astype(np.int64)
+    return number

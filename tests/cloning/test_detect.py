@@ -1,0 +1,139 @@
+"""Feature points found from shape alone: against known ones, from any pose, and a clear refusal of what is no face."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cloning.detect import Detection, detect_points
+from cloning.detect.xiang import LANDMARKS
+from cloning.prepare import PreparedFace, prepare
+from fat import AnimatableFace
+from fba import FaceScene, FeaturePoints, PolyMesh, Shape
+from fba.arrays import Floats
+from fba.errors import LandmarkError
+from fba.orientation import orient
+from formats import read_scene
+from formats.landmarks import read_landmarks
+from samples import sample
+
+SHARP = ("2.2", "2.3", "2.4", "2.5", "3.1", "3.2", "3.3", "3.4", "3.7", "3.8", "3.11", "3.12", "8.1", "8.2", "9.3")
+"""Points that lie on an edge or a tip."""
+
+TURN = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+"""Gaze along x, up along z."""
+
+
+@pytest.fixture(scope="module")
+def known(source: AnimatableFace) -> PreparedFace:
+    return prepare(source.scene, source.feature_points, "source")
+
+
+@pytest.fixture(scope="module")
+def tri() -> tuple[FaceScene, FeaturePoints]:
+    path = sample("faces/tri_head.obj")
+    scene = read_scene(path)
+    return scene, read_landmarks(path.with_name("tri_head.fps.json"), scene)
+
+
+@pytest.fixture(scope="module")
+def posed(tri: tuple[FaceScene, FeaturePoints]) -> FaceScene:
+    """The head with other axes, tilted by some degrees, in another unit, far from the origin, wound inside out."""
+    angle = np.radians(8.0)
+    tilt = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    turn = TURN @ tilt
+
+    def moved(vertices: Floats) -> Floats:
+        return 730.0 * vertices @ turn.T + np.array([9e3, -4e3, 2e4])
+
+    shapes = {s.name: replace(s, mesh=s.mesh.with_vertices(moved(s.mesh.vertices)).reversed()) for s in tri[0].shapes}
+    return tri[0].map_shapes(shapes)
+
+
+@pytest.fixture(scope="module")
+def detected(posed: FaceScene, known: PreparedFace) -> Detection:
+    return detect_points(posed, known)
+
+
+def errors(scene: FaceScene, found: FeaturePoints, truth: FeaturePoints) -> dict[str, float]:
+    """Distances from the truth in eye widths."""
+    at, wanted = found.positions(scene), truth.positions(scene)
+    width = 0.5 * sum(np.linalg.norm(wanted[a] - wanted[b]) for a, b in (("3.7", "3.11"), ("3.8", "3.12")))
+    return {k: float(np.linalg.norm(at[k] - wanted[k]) / width) for k in at if k in wanted}
+
+
+def test_points_are_found_whatever_the_pose(
+    tri: tuple[FaceScene, FeaturePoints], posed: FaceScene, detected: Detection
+) -> None:
+    surface = FeaturePoints({k: p for k, p in tri[1].items() if p.shape is not None})
+    off = errors(posed, detected.points, surface)
+    assert np.mean([off[k] for k in SHARP]) < 0.08
+    assert max(off[k] for k in SHARP) < 0.25
+    face = [v for k, v in off.items() if k.split(".")[0] in ("2", "3", "4", "5", "8", "9")]
+    assert np.mean(face) < 0.1
+
+
+def test_the_axes_follow_from_detected_points(posed: FaceScene, detected: Detection) -> None:
+    turned, _, findings = orient(posed, detected.points)
+    np.testing.assert_array_equal(turned.frame.axes, TURN.T)
+    assert "inside-out" in {f.code for f in findings}
+
+
+def test_parts_inside_the_head_are_found(posed: FaceScene, detected: Detection) -> None:
+    where = {key: p.shape for key, p in detected.points.items()}
+    assert (where["3.5"], where["3.6"]) == ("eye_left", "eye_right")
+    assert (where["9.10"], where["9.11"], where["6.1"]) == ("upper_teeth", "lower_teeth", "tongue")
+
+
+def test_sharp_points_are_surer_than_vague_ones(detected: Detection) -> None:
+    trust = {key: p.confidence for key, p in detected.points.items()}
+    assert all(0.0 < c <= 1.0 for c in trust.values())
+    assert min(trust[k] for k in ("2.2", "2.4", "3.1", "9.3")) > max(trust[k] for k in ("5.1", "11.1", "2.13"))
+    assert all(p.source == "detected" for p in detected.points.values())
+
+
+def test_given_points_are_kept_and_place_the_head(tri: tuple[FaceScene, FeaturePoints], known: PreparedFace) -> None:
+    scene, truth = tri
+    clicks = FeaturePoints({k: truth[k] for k in ("9.3", "2.1", "8.3", "8.4", "3.7", "3.12")})
+    found = detect_points(scene, known, clicks)
+    for key, point in clicks.items():
+        assert found.points[key] == point
+    off = errors(scene, found.points, truth)
+    assert np.mean([off[k] for k in SHARP]) < 0.08
+
+
+def test_xiang_finds_its_landmarks(tri: tuple[FaceScene, FeaturePoints], known: PreparedFace) -> None:
+    found = detect_points(tri[0], known, detector="xiang")
+    off = errors(tri[0], found.points, tri[1])
+    assert np.mean([off[k] for k in LANDMARKS]) < 0.15
+    assert max(off[k] for k in LANDMARKS) < 0.4
+    with pytest.raises(LandmarkError, match="no detector 'magic'"):
+        detect_points(tri[0], known, detector="magic")
+
+
+def ball() -> FaceScene:
+    """A sphere of 24 x 24 quads."""
+    u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False), np.linspace(0.05, np.pi - 0.05, 25))
+    places = np.stack([np.sin(v) * np.cos(u), np.cos(v), np.sin(v) * np.sin(u)], axis=2).reshape(-1, 3)
+    faces = [
+        [24 * r + c, 24 * r + (c + 1) % 24, 24 * (r + 1) + (c + 1) % 24, 24 * (r + 1) + c]
+        for r in range(24)
+        for c in range(24)
+    ]
+    return FaceScene((Shape("ball", PolyMesh.from_faces(places, faces)),), name="ball")
+
+
+def test_what_is_no_face_is_refused(known: PreparedFace) -> None:
+    with pytest.raises(LandmarkError, match="no face was found"):
+        detect_points(ball(), known)
+    nothing = FaceScene((Shape("points", PolyMesh.from_faces(np.eye(3), [])),), name="points")
+    with pytest.raises(LandmarkError, match="no polygons"):
+        detect_points(nothing, known)
+
+
+def test_a_creature_is_refused(shared: Path, known: PreparedFace) -> None:
+    with pytest.raises(LandmarkError, match="no face was found"):
+        detect_points(read_scene(shared / "faces" / "suzanne" / "suzanne.obj"), known)
