@@ -43,6 +43,9 @@ class Anchored(Protocol):
         ...
 
 
+DEFAULT_BACKEND = "fit"
+"""What `clone` uses when nobody chooses."""
+
 Builder = Callable[[PreparedFace, PreparedFace, bool], SkinTransfer]
 
 
@@ -93,6 +96,6 @@ def find_backend(name: str) -> Backend:
     return _BACKENDS[name]
 
 
-register_backend(Backend("fmc", "Facial Motion Cloning (Pandzic 2001)", "cloning.fmc"))
-register_backend(Backend("dt", "Elastic template and deformation transfer (Xiang et al. 2008)", "cloning.dt"))
 register_backend(Backend("fit", "elastic template and FAPU-scaled displacements", "cloning.fit"))
+register_backend(Backend("dt", "elastic template and deformation transfer (Xiang et al. 2008)", "cloning.dt"))
+register_backend(Backend("fmc", "Facial Motion Cloning (Pandzic 2001)", "cloning.fmc"))

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from cloning.backends import find_backend
+from cloning.backends import DEFAULT_BACKEND, find_backend
 from cloning.parts import PUPILS, eye_center
 from cloning.prepare import PreparedFace, prepare
 from cloning.report import CloneReport
@@ -57,7 +57,7 @@ def clone(
     onto: FaceScene | AnimatableFace,
     landmarks: FeaturePoints | None = None,
     *,
-    backend: str = "fmc",
+    backend: str = DEFAULT_BACKEND,
     as_published: bool = False,
     faps: Collection[int] | None = None,
     progress: Progress | None = None,
@@ -76,7 +76,7 @@ def clone_with_report(
     onto: FaceScene | AnimatableFace,
     landmarks: FeaturePoints | None = None,
     *,
-    backend: str = "fmc",
+    backend: str = DEFAULT_BACKEND,
     as_published: bool = False,
     faps: Collection[int] | None = None,
     progress: Progress | None = None,
@@ -144,7 +144,7 @@ def clone_shapes(
     onto: FaceScene | AnimatableFace,
     landmarks: FeaturePoints | None = None,
     *,
-    backend: str = "fmc",
+    backend: str = DEFAULT_BACKEND,
     as_published: bool = False,
     progress: Progress | None = None,
 ) -> tuple[ShapeSet, CloneReport]:
