@@ -1,11 +1,12 @@
 """How faithful the backends are: measures on faces whose motion is known, and on one whose is not.
 
-    python -m benchmarks.fidelity [--backends NAMES] [--makehuman FOLDER] [--faces FOLDER] [--sheets FOLDER]
-                                  [--json FILE]
+    python -m benchmarks.fidelity [--source mean|shipped] [--backends NAMES] [--makehuman FOLDER] [--faces FOLDER]
+                                  [--sheets FOLDER] [--json FILE]
 
-MakeHuman's source head is cloned onto two other phenotypes, decimated to another topology, where its own units are
-the truth (as they are, and scaled by FAPUs), and onto ICT-FaceKit, where no truth exists. Each backend's default mode
-stands beside the published one.
+A MakeHuman head is cloned onto two other phenotypes, as they are and decimated to another topology, where its own
+units are the truth (as they are, and scaled by FAPUs), and onto ICT-FaceKit, where no truth exists. The head is a mean
+phenotype with MakeHuman's own units, so that nothing but cloning differs from the truth; or the shipped source's,
+whose units are smoothed. Each backend's default mode stands beside the published one.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from fba.scene import FaceScene
 from fba.shapes import ShapeSet
 from formats import read_scene
 from samples.build.makehuman import open_makehuman
-from samples.build.phenotypes import KnownHead, decimated, known, phenotype_a, phenotype_b
+from samples.build.phenotypes import KnownHead, decimated, known, phenotype_a, phenotype_b, phenotype_mean
 from samples.build.source import source_head
 from studio.render.figure import Figure
 
@@ -36,6 +37,7 @@ SHARED = Path(__file__).resolve().parents[2] / "shared"
 LIPS = (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))
 LIDS = {"eyeBlinkLeft": ("3.1", "3.3"), "eyeBlinkRight": ("3.2", "3.4")}
 MOVING = 0.01
+SOURCES = {"mean": phenotype_mean, "shipped": source_head}
 FACE_UNITS = ("eyeBlinkLeft", "mouthSmileLeft", "jawOpen", "browInnerUp", "mouthFunnel", "cheekPuff")
 
 
@@ -51,6 +53,7 @@ class Target:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--source", choices=SOURCES, default="mean")
     parser.add_argument("--makehuman", type=Path, default=SHARED / "faces" / "makehuman")
     parser.add_argument("--faces", type=Path, default=SHARED)
     parser.add_argument("--sheets", type=Path)
@@ -58,7 +61,7 @@ def main() -> None:
     parser.add_argument("--backends", default=",".join(b.name for b in backends()), help="names, by commas")
     options = parser.parse_args()
     makehuman = open_makehuman(options.makehuman)
-    source = known(source_head(makehuman))
+    source = known(SOURCES[options.source](makehuman))
     shapes = source.shapes()
     prepared = prepare(source.scene, source.points, "source")
     rows = []

@@ -23,6 +23,9 @@ from samples.build.makehuman import MakeHuman
 POINTS_FILE = Path(__file__).with_name("makehuman_points.json")
 """Feature points on the base mesh: face = three base vertices, bary = their weights."""
 
+RACES = {"caucasian": 0.35, "asian": 0.35, "african": 0.3}
+SEXES = {"female": 0.6, "male": 0.4}
+
 EYES = (("eye_left", Role.EYE_LEFT, "helper-l-eye", "3.5"), ("eye_right", Role.EYE_RIGHT, "helper-r-eye", "3.6"))
 
 _SKIN = (
@@ -183,6 +186,16 @@ def macro(race: str, sex: str, age: str, weight: float) -> dict[tuple[str, str],
         ("macrodetails", f"{race}-{sex}-{age}"): weight,
         ("macrodetails", f"universal-{sex}-{age}-averagemuscle-averageweight"): weight,
     }
+
+
+def mean_mixture() -> dict[tuple[str, str], float]:
+    """A young face between all races and both sexes."""
+    mixture: dict[tuple[str, str], float] = {}
+    for race, share in RACES.items():
+        for sex, part in SEXES.items():
+            for key, weight in macro(race, sex, "young", share * part).items():
+                mixture[key] = mixture.get(key, 0.0) + weight
+    return mixture
 
 
 def _point_rows() -> dict[str, dict[str, list[float]]]:

@@ -19,7 +19,7 @@ from fba.mesh import PolyMesh
 from fba.scene import FaceScene, Shape
 from fba.shapes import ShapeSet
 from samples.build.contact import LIDS, LIPS, side_mask, surface_edge
-from samples.build.head import Head, build_head, macro
+from samples.build.head import Head, build_head, macro, mean_mixture
 from samples.build.makehuman import MakeHuman
 from samples.build.neutral import neutral
 from samples.build.surface import Places, nearest_facing
@@ -74,6 +74,11 @@ class KnownHead:
         zero = {s.name: np.zeros((s.mesh.vertex_count, 3)) for s in self.scene.shapes}
         deltas = np.stack([self.scene.gather({**zero, **self.units[name]}) for name in chosen])
         return ShapeSet(chosen, self.scene.world_neutral(), deltas)
+
+
+def phenotype_mean(makehuman: MakeHuman) -> Head:
+    """The shipped source's mixture as MakeHuman has it: its own polygons and units, neither smoothed nor symmetric."""
+    return neutral(build_head(makehuman, mean_mixture(), "phenotype_mean"), 0.155)
 
 
 def phenotype_a(makehuman: MakeHuman) -> Head:

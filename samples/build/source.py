@@ -13,13 +13,11 @@ from fba.arrays import Floats
 from fba.scene import FaceScene
 from samples.build.colors import skin_materials
 from samples.build.fine import fine
-from samples.build.head import Head, build_head, macro
+from samples.build.head import Head, build_head, mean_mixture
 from samples.build.makehuman import ARKIT_UNITS, MakeHuman
 from samples.build.neutral import neutral
 from samples.build.symmetry import SymmetricMakeHuman
 
-RACES = {"caucasian": 0.35, "asian": 0.35, "african": 0.3}
-SEXES = {"female": 0.6, "male": 0.4}
 LID_OPENING = 0.155
 """Of the eye separation: nearly MakeHuman's own; the iris is as wide."""
 TEETH_SHOWN = 0.035
@@ -28,12 +26,7 @@ TEETH_SHOWN = 0.035
 
 def source_head(makehuman: MakeHuman) -> Head:
     """The source's neutral head: a mixture of all races and both sexes, symmetric, smooth, in the neutral pose."""
-    mixture: dict[tuple[str, str], float] = {}
-    for race, share in RACES.items():
-        for sex, part in SEXES.items():
-            for key, weight in macro(race, sex, "young", share * part).items():
-                mixture[key] = mixture.get(key, 0.0) + weight
-    coarse = build_head(SymmetricMakeHuman(makehuman.read), mixture, "source")
+    coarse = build_head(SymmetricMakeHuman(makehuman.read), mean_mixture(), "source")
     return neutral(fine(coarse), LID_OPENING, TEETH_SHOWN)
 
 
