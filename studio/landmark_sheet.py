@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
@@ -41,7 +43,7 @@ def landmark_sheet(
         camera = middle.turned(yaw)
         picture = figure.draw(size=SIZE, camera=camera, renderer=renderer)
         shown = [key for key in points if key not in normals or (camera.rotation() @ normals[key])[2] > 0.1]
-        pictures.append(_marked(picture, points, places, shown, camera, figure))
+        pictures.append(marked(picture, points, places, shown, camera, figure))
     sheet = Sheet(title)
     sheet.add_row("", pictures, [name for name, _ in VIEWS])
     return sheet.image()
@@ -59,26 +61,29 @@ def point_color(point: FeaturePoint) -> tuple[int, int, int]:
     return (round(220 * min(1.0, 2.0 - share)), round(200 * min(1.0, share)), 40)
 
 
-def _marked(
+def marked(
     picture: UInt8,
     points: FeaturePoints,
-    places: dict[str, Floats],
-    shown: list[str],
+    places: Mapping[str, Floats],
+    shown: Sequence[str],
     camera: Camera,
     figure: Figure,
+    dot: int = DOT,
+    numbers: bool = True,
 ) -> UInt8:
-    """The picture with a dot and a number for each point."""
+    """The picture (of a figure by a camera) with a dot for each point shown, its number beside it."""
     image = Image.fromarray(picture)
     draw = ImageDraw.Draw(image)
     font = ImageFont.load_default(9)
     if shown:
-        width, height = SIZE
+        height, width = picture.shape[:2]
         matrix = camera.clip_matrix(width, height, *depth_range(figure.drawables(), camera))
         flat, _ = project(np.array([places[key] for key in shown]), matrix)
         for key, (x, y, _) in zip(shown, flat, strict=True):
             u, v = (x + 1.0) * width / 2.0, (1.0 - y) * height / 2.0
-            draw.ellipse((u - DOT, v - DOT, u + DOT, v + DOT), fill=point_color(points[key]))
-            draw.text((u + DOT + 1, v - 5), key, (20, 20, 20), font)
+            draw.ellipse((u - dot, v - dot, u + dot, v + dot), fill=point_color(points[key]))
+            if numbers:
+                draw.text((u + dot + 1, v - 5), key, (20, 20, 20), font)
     return np.asarray(image)
 
 
