@@ -88,7 +88,7 @@ def test_clone_keeps_the_mesh_and_reports(cloned: Path) -> None:
     np.testing.assert_array_equal(face.scene.world_neutral(), head.world_neutral())
     assert sum(s.mesh.face_count for s in face.scene.shapes) == sum(s.mesh.face_count for s in head.shapes)
     report = json.loads(cloned.with_suffix(".json").read_text())
-    assert report["backend"] == "fmc"
+    assert report["backend"] == "fit"
     assert report["timings"]
 
 
