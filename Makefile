@@ -13,7 +13,7 @@ test: $(VENV)/.installed-test peers
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile
 
 # Fidelity and speed tables; see docs/benchmarks.md.
 benchmark: $(VENV)/.installed-test
