@@ -133,23 +133,26 @@ class _Query:
         self._refused, self._least, self._best = refused, least_facing, best
 
     def offer(self, rows: Ints, triangles: Ints) -> None:
-        """Try pairs: row of a point, index of a triangle."""
+        """Try pairs: row of a point, in ascending order, and index of a triangle."""
         search, best = self._search, self._best
-        away = np.linalg.norm(self._points[rows] - search._centers[triangles], axis=1) - search._radii[triangles]
-        kept = (away < best.distances[rows]) & (search._bits[triangles] & self._refused[rows] == 0)
+        away = self._points[rows] - search._centers[triangles]
+        near = np.sqrt(np.einsum("nd,nd->n", away, away)) - search._radii[triangles] < best.distances[rows]
+        kept = np.flatnonzero(near & (search._bits[triangles] & self._refused[rows] == 0))
         rows, triangles = rows[kept], triangles[kept]
         facing = np.ones(len(rows))
         if self._normals is not None:
             facing = np.einsum("nd,nd->n", self._normals[rows], search.normals[triangles])
-            kept = facing >= self._least
+            kept = np.flatnonzero(facing >= self._least)
             rows, triangles, facing = rows[kept], triangles[kept], facing[kept]
         if not len(rows):
             return
         weights, distances = closest_on_triangles(self._points[rows], search.corners[triangles])
-        order = np.lexsort((triangles, distances, rows))
-        first = np.ones(len(order), bool)
-        first[1:] = rows[order][1:] != rows[order][:-1]
-        chosen = order[first]
+        starts = np.flatnonzero(np.diff(rows, prepend=-1))
+        count = np.diff(starts, append=len(rows))
+        nearest = distances == np.repeat(np.minimum.reduceat(distances, starts), count)
+        # The lowest index wins where triangles are equally near, as at a common edge.
+        index = np.where(nearest, triangles, len(search.triangles))
+        chosen = np.flatnonzero(index == np.repeat(np.minimum.reduceat(index, starts), count))
         chosen = chosen[distances[chosen] < best.distances[rows[chosen]]]
         at = rows[chosen]
         best.triangles[at], best.weights[at] = triangles[chosen], weights[chosen]

@@ -6,6 +6,7 @@ With the stiffness S (cotangent weights) and vertex areas A the paper's operator
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -52,19 +53,28 @@ def vertex_areas(vertices: Floats, triangles: Ints) -> Floats:
     return areas
 
 
-def elastic(vertices: Floats, triangles: Ints, k_s: float, k_b: float) -> tuple[Any, Floats]:
-    """The system of both energies, and the vertex areas.
+@dataclass(frozen=True, eq=False)
+class Energies:
+    """Both energies of a surface.
 
-    Parameters
+    Attributes
     ----------
-    k_s, k_b : weights of membrane and bending.
-
-    Returns
-    -------
-    system : (n, n) sparse, symmetric, positive semidefinite; its null space are translations.
-    areas : (n,)
+    membrane, bending : (n, n) sparse, symmetric, positive semidefinite; their null space are translations.
+    areas : (n,) of the vertices.
     """
+
+    membrane: Any
+    bending: Any
+    areas: Floats
+
+    def system(self, k_s: float, k_b: float) -> Any:
+        """(n, n) sparse, their weighted sum."""
+        return k_s * self.membrane + k_b * self.bending
+
+
+def energies(vertices: Floats, triangles: Ints) -> Energies:
+    """Membrane and bending of (n, 3) vertices and (t, 3) triangles."""
     from scipy.sparse import diags_array
 
     s, areas = stiffness(vertices, triangles), vertex_areas(vertices, triangles)
-    return k_s * s + k_b * (s @ (diags_array(1.0 / areas) @ s)), areas
+    return Energies(s, s @ (diags_array(1.0 / areas) @ s), areas)

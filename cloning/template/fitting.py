@@ -8,18 +8,19 @@ from a spline through the landmarks and remembers that start, so that skin slide
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from cloning.align import anchor_ids, warp_by_points
-from cloning.locate import Places
+from cloning.locate import closest_on_triangles
 from cloning.similarity import fit_similarity
 from cloning.surface import Surface
 from cloning.template.closest import TriangleSearch
-from cloning.template.energies import elastic
+from cloning.template.energies import energies
 from cloning.template.landmarks import landmarks_of
+from cloning.template.level import FEWEST, Level, vertex_normals, welded
 from cloning.visibility import visible as visible_vertices
 from fba.arrays import Bools, Floats, Ints
 
@@ -56,6 +57,7 @@ class Schedule:
     even : weights change by the same factor from step to step, not by the same amount.
     by_area : see `k_m`.
     remembers : energies count from the start, not from the last step: the fit is elastic, it does not flow.
+    fine : last steps on the whole template; those before are taken on coarser meshes of it. None = all on the whole.
     """
 
     k_s: tuple[float, float]
@@ -67,6 +69,7 @@ class Schedule:
     even: bool
     by_area: bool
     remembers: bool
+    fine: int | None = None
 
     def weights(self, step: int) -> tuple[float, float, float, float]:
         """k_s, k_b, k_m, k_c of one step."""
@@ -85,7 +88,7 @@ class Schedule:
 PUBLISHED = Schedule((1.0, 1e-3), (1e-9, 1e-12), (200.0, 2000.0), (0.0, 6000.0), 10, 1, False, True, False)
 """The paper's schedule; k_m and k_c are printed as 100 to 1000 and 0 to 3000 and stand in the equation twice."""
 
-BENDING = Schedule((0.05, 5e-4), (1e-2, 1e-4), (1e4, 1e4), (3.0, 300.0), 14, 2, True, False, True)
+BENDING = Schedule((0.05, 5e-4), (1e-2, 1e-4), (1e4, 1e4), (3.0, 300.0), 20, 2, True, False, True, 2)
 """Bending rules what is smaller than 2.8 eye separations; the membrane keeps the rest from drifting."""
 
 
@@ -96,7 +99,7 @@ class Fitted:
     Attributes
     ----------
     vertices : (n, 3) the template's vertices, in the target's space and eye separations.
-    residual : (n,) distance to the target's skin; inf where nothing there fits.
+    residual : (n,) distance to the triangle of the target that pulled last; inf where none did.
     valid : (n,) bool, vertices that a closest point has pulled in the last step.
     """
 
@@ -128,39 +131,19 @@ def fit_template(
     start : (n, 3) where the template starts; None = where the landmarks take it.
     progress : called with the share done.
     """
-    from scipy.sparse import diags_array
-
     ids = anchor_ids(template, target) if landmarks is None else list(landmarks)
     mine, yours = (None, None) if labels is None else labels
-    mesh = _Welded(template)
-    marks = landmarks_of(template, target, ids, mine)
-    marks = replace(marks, rows=marks.rows @ mesh.spread)
     if visible is None:
         reach = np.where(visible_vertices(template), REACH, HIDDEN_REACH)
     else:
         reach = np.where(visible, REACH, 0.0)
+    start = _start(template, target, ids, schedule) if start is None else start
     search = TriangleSearch(target.vertices, target.triangles, yours)
-    pull = _Pull(search, mesh.triangles, mesh.pick(reach), None if mine is None else mesh.pick(mine))
-    current = mesh.pick(_start(template, target, ids, schedule) if start is None else start)
-    rest, even = current, np.full(len(marks.goals), 1.0 / max(len(marks.goals), 1))
-    pulled = np.zeros(len(current), bool)
-    for step in range(schedule.steps):
-        k_s, k_b, k_m, k_c = schedule.weights(step)
-        rest = rest if schedule.remembers else current
-        system, areas = elastic(rest, mesh.triangles, k_s, k_b)
-        more, right = marks.term(current, k_m * (marks.rows @ areas if schedule.by_area else even))
-        right = right - system @ (current - rest)
-        if k_c > 0.0:
-            pulled, way = pull.ways(current)
-            size = np.where(pulled, k_c * areas, 0.0)
-            more, right = more + diags_array(size), right + size[:, None] * way
-        # A part without any landmark or closest point stays where it is.
-        held = system + more + diags_array(LOOSE * areas)
-        current = current + _solve(held, right)
-        if progress is not None:
-            progress((step + 1) / schedule.steps)
-    places = pull.places(current)
-    return Fitted(mesh.spread @ current, mesh.expand(places.distances), mesh.expand(pulled))
+    finest = welded(template, start, landmarks_of(template, target, ids, mine), reach, mine)
+    fit = _Fit(finest, search, schedule, progress)
+    current, pulled, distances = fit.run()
+    places = template.places
+    return Fitted(current[places], distances[places], pulled[places])
 
 
 def _start(template: Surface, target: Surface, ids: Sequence[str], schedule: Schedule) -> Floats:
@@ -173,55 +156,92 @@ def _start(template: Surface, target: Surface, ids: Sequence[str], schedule: Sch
     return fit_similarity(places, goals).apply(template.vertices)
 
 
-class _Welded:
-    """A surface whose seams are closed: one vertex for all that lie at one place of a seam."""
+class _Fit:
+    """A fit under way."""
 
-    def __init__(self, surface: Surface) -> None:
-        from scipy.sparse import coo_array, csr_array
-        from scipy.sparse.csgraph import connected_components
+    def __init__(
+        self, finest: Level, search: TriangleSearch, schedule: Schedule, progress: Callable[[float], None] | None
+    ) -> None:
+        self._search, self._schedule, self._progress = search, schedule, progress
+        self._levels, self._spreads = [finest], []
+        while schedule.fine is not None and len(self._levels[-1].start) > FEWEST:
+            level, spread = self._levels[-1].coarser()
+            self._levels.append(level)
+            self._spreads.append(spread)
 
-        n = surface.vertex_count
-        pairs = coo_array((np.ones(len(surface.links)), (surface.links[:, 0], surface.links[:, 1])), shape=(n, n))
-        count, self.group = connected_components(pairs, directed=False)
-        self.first = np.unique(self.group, return_index=True)[1]
-        self.triangles: Ints = self.group[surface.triangles]
-        self.spread: Any = csr_array((np.ones(n), (np.arange(n), self.group)), shape=(n, count))
+    def run(self) -> tuple[Floats, Bools, Floats]:
+        """From the coarsest mesh to the finest.
 
-    def pick(self, values: Any) -> Any:
-        """One value for each welded vertex, from (n, ...)."""
-        return values[self.first]
+        Returns
+        -------
+        vertices, which of them a closest point has pulled in the last step, and their distances from the target.
+        """
+        schedule, done = self._schedule, 0
+        current = self._levels[-1].start
+        for number in reversed(range(len(self._levels))):
+            level = self._levels[number]
+            pull = _Pull(self._search, level)
+            stop = schedule.steps - (schedule.fine or 0) * number
+            for step in range(done, stop):
+                current = _stepped(level, current, pull, schedule.weights(step), schedule)
+                if self._progress is not None:
+                    self._progress((step + 1) / schedule.steps)
+            done = stop
+            if number:
+                current = self._levels[number - 1].start + self._spreads[number - 1] @ (current - level.start)
+        return current, pull.pulled, pull.distances(current)
 
-    def expand(self, values: Any) -> Any:
-        """(n, ...) values, from one for each welded vertex."""
-        return values[self.group]
+
+def _stepped(
+    level: Level, current: Floats, pull: _Pull, weights: tuple[float, float, float, float], schedule: Schedule
+) -> Floats:
+    """One solve: (n, 3) where the vertices go."""
+    from scipy.sparse import diags_array
+
+    k_s, k_b, k_m, k_c = weights
+    energy = level.energies if schedule.remembers else energies(current, level.triangles)
+    rest = level.start if schedule.remembers else current
+    system, areas, marks = energy.system(k_s, k_b), energy.areas, level.marks
+    even = np.full(len(marks.goals), 1.0 / max(len(marks.goals), 1))
+    more, right = marks.term(current, k_m * (marks.rows @ areas if schedule.by_area else even))
+    right = right - system @ (current - rest)
+    # A part without any landmark or closest point stays where it is.
+    diagonal = LOOSE * areas
+    if k_c > 0.0:
+        pulled, way = pull.ways(current)
+        size = np.where(pulled, k_c * areas, 0.0)
+        diagonal, right = diagonal + size, right + size[:, None] * way
+    return current + _solve(system + more + diags_array(diagonal), right)
 
 
 class _Pull:
     """Where each vertex of the template is drawn to."""
 
-    def __init__(self, search: TriangleSearch, triangles: Ints, reach: Floats, labels: Ints | None) -> None:
-        self._search, self._triangles, self._labels = search, triangles, labels
-        self._seen = np.flatnonzero(reach > 0.0)
-        self._reach = reach[self._seen]
-        self._last: Ints | None = None
-
-    def places(self, current: Floats) -> Places:
-        """The closest points on the target of all vertices that look for one."""
-        n = len(current)
-        normals = vertex_normals(current, self._triangles)[self._seen]
-        labels = None if self._labels is None else self._labels[self._seen]
-        found = self._search.closest(current[self._seen], normals, labels, FACING, self._reach, self._last)
-        self._last = found.triangles.copy()
-        every = Places(np.full(n, -1, np.int32), np.zeros((n, 3)), np.full(n, np.inf), np.full(n, -1.0))
-        every.triangles[self._seen], every.weights[self._seen] = found.triangles, found.weights
-        every.distances[self._seen], every.facing[self._seen] = found.distances, found.facing
-        return every
+    def __init__(self, search: TriangleSearch, level: Level) -> None:
+        self._search, self._triangles, self._labels = search, level.triangles, level.labels
+        self._seen = np.flatnonzero(level.reach > 0.0)
+        self._reach = level.reach[self._seen]
+        self._last: Ints = np.full(len(level.start), -1, np.int32)
+        self.pulled: Bools = np.zeros(len(level.start), bool)
 
     def ways(self, current: Floats) -> tuple[Bools, Floats]:
         """Which vertices are drawn, and how far, (n, 3)."""
-        places = self.places(current)
-        found = places.triangles >= 0
-        return found, np.where(found[:, None], self._search.positions(places) - current, 0.0)
+        seen = self._seen
+        normals = vertex_normals(current, self._triangles)[seen]
+        labels = None if self._labels is None else self._labels[seen]
+        found = self._search.closest(current[seen], normals, labels, FACING, self._reach, self._last[seen])
+        self._last[seen] = found.triangles
+        self.pulled = self._last >= 0
+        way = np.zeros_like(current)
+        way[seen] = np.where(found.triangles[:, None] >= 0, self._search.positions(found) - current[seen], 0.0)
+        return self.pulled, way
+
+    def distances(self, current: Floats) -> Floats:
+        """(n,) distances to the triangles that drew last; inf where none did."""
+        found = np.full(len(current), np.inf)
+        some = self.pulled
+        found[some] = closest_on_triangles(current[some], self._search.corners[self._last[some]])[1]
+        return found
 
 
 def _solve(system: Any, right: Floats) -> Floats:
@@ -234,15 +254,3 @@ def _solve(system: Any, right: Floats) -> Floats:
     lu = splu(system.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     solved: Floats = lu.solve(np.asfortranarray(right))
     return solved
-
-
-def vertex_normals(vertices: Floats, triangles: Ints) -> Floats:
-    """(n, 3) unit normals, triangles counted by area."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a)
-    normals = np.stack(
-        [np.bincount(triangles.ravel(), np.repeat(cross[:, axis], 3), len(vertices)) for axis in range(3)], axis=1
-    )
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    unit: Floats = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
-    return unit

@@ -14,9 +14,12 @@ from cloning.prepare import PreparedFace, prepare
 from cloning.similarity import fit_similarity
 from cloning.surface import Surface, build_surface
 from cloning.template.closest import TriangleSearch
+from cloning.template.coarse import coarser
 from cloning.template.correspondence import correspond
-from cloning.template.energies import elastic, stiffness, vertex_areas
+from cloning.template.energies import energies, stiffness, vertex_areas
 from cloning.template.fitting import BENDING, PUBLISHED, Fitted, Schedule, fit_template
+from cloning.template.level import FEWEST
+from cloning.visibility import visible
 from fat import AnimatableFace
 from fba import FaceScene, FeaturePoint, FeaturePoints, PolyMesh, Shape
 from fba.arrays import Floats
@@ -105,7 +108,7 @@ def test_membrane_interpolates_linearly_and_bending_smoothly() -> None:
     wanted = np.where(middle, 1.0, 0.0)
     solved = []
     for k_s, k_b in ((1.0, 0.0), (0.0, 1.0)):
-        system, _ = elastic(strip.vertices, strip.triangles, k_s, k_b)
+        system = energies(strip.vertices, strip.triangles).system(k_s, k_b)
         solved.append(np.linalg.solve(system.toarray() + np.diag(held), held * wanted))
     row = np.argsort(x[16 * 33 : 17 * 33]) + 16 * 33
     t = x[row]
@@ -165,8 +168,8 @@ def test_schedules_run_from_their_first_to_their_last_weights() -> None:
     assert PUBLISHED.weights(0) == pytest.approx((1.0, 1e-9, 200.0, 0.0))
     assert PUBLISHED.weights(9) == pytest.approx((1e-3, 1e-12, 2000.0, 6000.0))
     assert [BENDING.weights(k)[3] for k in range(3)] == pytest.approx([0.0, 0.0, 3.0])
-    assert BENDING.weights(13) == pytest.approx((5e-4, 1e-4, 1e4, 300.0))
-    steps = np.array([BENDING.weights(k)[1] for k in range(14)])
+    assert BENDING.weights(19) == pytest.approx((5e-4, 1e-4, 1e4, 300.0))
+    steps = np.array([BENDING.weights(k)[1] for k in range(20)])
     assert np.allclose(steps[1:] / steps[:-1], steps[1] / steps[0])
 
 
@@ -230,3 +233,46 @@ def test_vertices_without_landmarks_and_partners_stay(head: PreparedFace) -> Non
     fitted = fit_template(head.skin, head.skin, (), visible=np.zeros(head.skin.vertex_count, bool), schedule=still)
     assert np.allclose(fitted.vertices, head.skin.vertices, atol=1e-9)
     assert not fitted.valid.any()
+
+
+def test_a_coarser_mesh_keeps_the_shape_and_spreads_its_fields() -> None:
+    vertices, triangles = sphere()
+    mesh = coarser(vertices, triangles)
+    count = len(mesh.kept)
+    assert 0.2 * len(vertices) < count < 0.4 * len(vertices)
+    edges = {
+        tuple(sorted(pair)) for t in mesh.triangles.tolist() for pair in ((t[0], t[1]), (t[1], t[2]), (t[2], t[0]))
+    }
+    assert count - len(edges) + len(mesh.triangles) == 2, "a sphere still"
+    a, b, c = (vertices[mesh.kept][mesh.triangles[:, k]] for k in range(3))
+    outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c)
+    assert outward.min() > 0.0
+    spread = mesh.spread(vertices)
+    assert np.allclose(spread.sum(axis=1), 1.0)
+    assert np.allclose((spread @ vertices[mesh.kept])[mesh.kept], vertices[mesh.kept])
+    assert np.abs(spread @ vertices[mesh.kept] - vertices).max() < 0.02, "edges are 0.05 long"
+
+
+def test_a_coarser_mesh_keeps_slits_and_single_vertices_apart() -> None:
+    upper, lower = sheet(12), sheet(12)
+    touching = lower.vertices * [1.0, -1.0, 1.0]
+    vertices = np.concatenate([upper.vertices, touching, [[5.0, 5.0, 5.0]]])
+    triangles = np.concatenate([upper.triangles, lower.triangles[:, ::-1] + 144])
+    mesh = coarser(vertices, triangles)
+    side = np.repeat([0, 1, 2], [144, 144, 1])
+    assert np.array_equal(side[mesh.kept][mesh.owner], side)
+    spread = mesh.spread(vertices)
+    assert np.allclose(spread @ side[mesh.kept].astype(float), side), "nothing leaks over the slit"
+
+
+def test_a_face_finds_its_own_warped_copy_from_coarse_to_fine(head: PreparedFace) -> None:
+    def warp(v: Floats) -> Floats:
+        return v * [1.15, 0.9, 1.05] + 0.05 * np.sin(4.0 * v[:, [1, 2, 0]])
+
+    target = moved(head.skin, warp)
+    assert BENDING.fine is not None
+    assert head.skin.vertex_count > FEWEST, "there are coarser meshes"
+    fitted = fit_template(head.skin, target, labels=(head.labels.values, head.labels.values))
+    away = np.linalg.norm(fitted.vertices - target.vertices, axis=1)[visible(head.skin)]
+    assert away.mean() < 0.02
+    assert fitted.residual[fitted.valid].mean() < 2e-4
