@@ -19,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from cloning.deformation import COLUMNS, deformation_transfer
+from cloning.deformation import deformation_transfer
 from cloning.prepare import prepare
+from cloning.shape_solver import COLUMNS
 from cloning.source import source_motions
 from fba.arrays import Floats, Ints
 from formats import read_face

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from cloning.deformation import COLUMNS, DeformationTransfer, deformation_transfer
+from cloning.deformation import deformation_transfer
 from cloning.prepare import prepare
+from cloning.shape_solver import COLUMNS, ShapeTransfer
 from cloning.source import source_motions
 from cloning.surface import Surface
 from fat import AnimatableFace
@@ -245,5 +246,5 @@ def test_many_motions_at_once_are_the_same_as_one_by_one() -> None:
     assert np.allclose(together, one_by_one(transfer, motion), atol=1e-12)
 
 
-def one_by_one(transfer: DeformationTransfer, motions: Floats) -> Floats:
+def one_by_one(transfer: ShapeTransfer, motions: Floats) -> Floats:
     return np.concatenate([transfer.apply(motions[:, [k]]) for k in range(motions.shape[1])], axis=1)

@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 from cloning import clone_with_report
 from cloning.backends import Anchored, find_backend
 from cloning.deformation import deformation_transfer
-from cloning.dt import LANDMARKS, DeformedTransfer, PublishedDeformation
+from cloning.dt import LANDMARKS
+from cloning.local_transfer import BareTransfer, GoalTransfer
 from cloning.normalize import ratios
 from cloning.prepare import PreparedFace, prepare
 from cloning.refine import refine
@@ -44,14 +45,14 @@ def yours(wide: tuple[FaceScene, FeaturePoints]) -> PreparedFace:
 
 
 @pytest.fixture(scope="module")
-def transfer(mine: PreparedFace, yours: PreparedFace) -> DeformedTransfer:
+def transfer(mine: PreparedFace, yours: PreparedFace) -> GoalTransfer:
     made = find_backend("dt").build(mine, yours, False)
-    assert isinstance(made, DeformedTransfer)
+    assert isinstance(made, GoalTransfer)
     return made
 
 
 @pytest.fixture(scope="module")
-def corrected(mine: PreparedFace, yours: PreparedFace, transfer: DeformedTransfer, motions: Floats) -> FaceTransfer:
+def corrected(mine: PreparedFace, yours: PreparedFace, transfer: GoalTransfer, motions: Floats) -> FaceTransfer:
     """The whole face's transfer, after it has carried the motions."""
     whole = build_face_transfer(mine, yours, transfer, False)
     whole.apply([mine.skin.split(motions[:, k]) for k in range(motions.shape[1])])
@@ -81,7 +82,7 @@ def relative(found: Floats, truth: Floats) -> Floats:
 
 
 def test_fitted_map_does_nearly_as_well_as_the_true_one(
-    mine: PreparedFace, yours: PreparedFace, transfer: DeformedTransfer, motions: Floats
+    mine: PreparedFace, yours: PreparedFace, transfer: GoalTransfer, motions: Floats
 ) -> None:
     skin = mine.skin
     still = (~motions.any(axis=(1, 2))).astype(float)
@@ -96,7 +97,7 @@ def test_fitted_map_does_nearly_as_well_as_the_true_one(
 
 
 def test_skin_that_rests_in_the_source_rests_in_the_target(
-    mine: PreparedFace, transfer: DeformedTransfer, motions: Floats
+    mine: PreparedFace, transfer: GoalTransfer, motions: Floats
 ) -> None:
     found = transfer.apply(motions)
     matched = ~transfer.skin_map.unmatched
@@ -109,7 +110,7 @@ def test_skin_that_rests_in_the_source_rests_in_the_target(
 
 
 def test_feature_points_without_a_partner_have_their_goal_at_the_source_s_own_place(
-    mine: PreparedFace, yours: PreparedFace, transfer: DeformedTransfer
+    mine: PreparedFace, yours: PreparedFace, transfer: GoalTransfer
 ) -> None:
     lost = transfer.ids.index("9.3")
     away = np.ones(yours.skin.vertex_count)
@@ -121,7 +122,7 @@ def test_feature_points_without_a_partner_have_their_goal_at_the_source_s_own_pl
     assert np.array_equal(rows.toarray()[lost], own)
 
 
-def test_each_motion_comes_out_the_same_in_any_company(transfer: DeformedTransfer, motions: Floats) -> None:
+def test_each_motion_comes_out_the_same_in_any_company(transfer: GoalTransfer, motions: Floats) -> None:
     assert isinstance(transfer, Anchored)
     reach = np.linalg.norm(motions, axis=2).max(axis=1)
     ready = transfer.anchored(reach)
@@ -149,7 +150,7 @@ def test_published_mode_is_the_papers(
 ) -> None:
     assert len(LANDMARKS) == len(set(LANDMARKS)) == 20
     made = find_backend("dt").build(mine, yours, True)
-    assert isinstance(made, PublishedDeformation)
+    assert isinstance(made, BareTransfer)
     assert made.parameters["landmarks"] == 20
     ready = made.anchored(np.linalg.norm(motions, axis=2).max(axis=1))
     assert ready.solver is not None
