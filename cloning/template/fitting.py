@@ -20,7 +20,7 @@ from cloning.surface import Surface
 from cloning.template.closest import TriangleSearch
 from cloning.template.energies import energies
 from cloning.template.landmarks import landmarks_of
-from cloning.template.level import FEWEST, Level, vertex_normals, welded
+from cloning.template.level import FEWEST, Level, welded
 from cloning.visibility import visible as visible_vertices
 from fba.arrays import Bools, Floats, Ints
 
@@ -147,7 +147,7 @@ def fit_template(
 
 
 def _start(template: Surface, target: Surface, ids: Sequence[str], schedule: Schedule) -> Floats:
-    """The template where its landmarks say: by a similarity, and what is to be remembers by a spline of space."""
+    """The template where its landmarks say: by a similarity, and what is to be remembered by a spline of space."""
     if len(ids) < LEAST_LANDMARKS:
         return template.vertices
     if schedule.remembers and len(ids) >= LEAST_ANCHORS:
@@ -163,11 +163,9 @@ class _Fit:
         self, finest: Level, search: TriangleSearch, schedule: Schedule, progress: Callable[[float], None] | None
     ) -> None:
         self._search, self._schedule, self._progress = search, schedule, progress
-        self._levels, self._spreads = [finest], []
+        self._levels = [finest]
         while schedule.fine is not None and len(self._levels[-1].start) > FEWEST:
-            level, spread = self._levels[-1].coarser()
-            self._levels.append(level)
-            self._spreads.append(spread)
+            self._levels.append(self._levels[-1].coarser())
 
     def run(self) -> tuple[Floats, Bools, Floats]:
         """From the coarsest mesh to the finest.
@@ -187,8 +185,8 @@ class _Fit:
                 if self._progress is not None:
                     self._progress((step + 1) / schedule.steps)
             done = stop
-            if number:
-                current = self._levels[number - 1].start + self._spreads[number - 1] @ (current - level.start)
+            if level.finer is not None:
+                current = level.finer.spread(current - level.start)
         return current, pull.pulled, pull.distances(current)
 
 
@@ -218,7 +216,7 @@ class _Pull:
     """Where each vertex of the template is drawn to."""
 
     def __init__(self, search: TriangleSearch, level: Level) -> None:
-        self._search, self._triangles, self._labels = search, level.triangles, level.labels
+        self._search, self._level, self._labels = search, level, level.labels
         self._seen = np.flatnonzero(level.reach > 0.0)
         self._reach = level.reach[self._seen]
         self._last: Ints = np.full(len(level.start), -1, np.int32)
@@ -227,7 +225,7 @@ class _Pull:
     def ways(self, current: Floats) -> tuple[Bools, Floats]:
         """Which vertices are drawn, and how far, (n, 3)."""
         seen = self._seen
-        normals = vertex_normals(current, self._triangles)[seen]
+        normals = self._level.normals(current)[seen]
         labels = None if self._labels is None else self._labels[seen]
         found = self._search.closest(current[seen], normals, labels, FACING, self._reach, self._last[seen])
         self._last[seen] = found.triangles

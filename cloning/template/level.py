@@ -29,6 +29,7 @@ class Level:
     marks : landmarks of its vertices.
     reach : (n,) how far each vertex looks for closest points, 0 = not at all.
     labels : (n,) of lips and lids, or None.
+    finer : the mesh that this one is a coarser version of, or None.
     """
 
     start: Floats
@@ -36,23 +37,53 @@ class Level:
     marks: Landmarks
     reach: Floats
     labels: Ints | None
+    finer: Finer | None = None
 
     @cached_property
     def energies(self) -> Energies:
         """Those of the start."""
         return energies(self.start, self.triangles)
 
-    def coarser(self) -> tuple[Level, Any]:
-        """A mesh of about a quarter of the vertices, and (n, c) the sparse matrix that spreads its fields."""
+    def normals(self, current: Floats) -> Floats:
+        """(n, 3) unit normals of the template with its vertices at (n, 3).
+
+        A coarser mesh has those of the finest: its own ones differ where skin is strongly curved.
+        """
+        if self.finer is None:
+            return vertex_normals(current, self.triangles)
+        return self.finer.level.normals(self.finer.spread(current - self.start))[self.finer.kept]
+
+    def coarser(self) -> Level:
+        """A mesh of about a quarter of the vertices."""
         mesh = coarser(self.start, self.triangles)
-        spread = mesh.spread(self.start)
-        kept = mesh.kept
+        kept, spread = mesh.kept, mesh.spread(self.start)
         start, rows = self.start[kept], self.marks.rows @ spread
         # Landmarks ask for the same ways as on the finer mesh.
         goals = self.marks.goals - self.marks.rows @ self.start + rows @ start
         marks = replace(self.marks, rows=rows, goals=goals)
         labels = None if self.labels is None else self.labels[kept]
-        return Level(start, mesh.triangles, marks, self.reach[kept], labels), spread
+        return Level(start, mesh.triangles, marks, self.reach[kept], labels, Finer(self, kept, spread))
+
+
+@dataclass(frozen=True, eq=False)
+class Finer:
+    """How a coarser mesh moves a finer one.
+
+    Attributes
+    ----------
+    level : the finer mesh.
+    kept : (c,) its vertices that the coarser mesh has.
+    matrix : (n, c) sparse, spreads a field of them.
+    """
+
+    level: Level
+    kept: Ints
+    matrix: Any
+
+    def spread(self, ways: Floats) -> Floats:
+        """(n, 3) where the finer mesh's vertices are when the coarser one's have gone (c, 3) ways from their start."""
+        places: Floats = self.level.start + self.matrix @ ways
+        return places
 
 
 def welded(surface: Surface, start: Floats, marks: Landmarks, reach: Floats, labels: Ints | None) -> Level:

@@ -276,3 +276,8 @@ def test_a_face_finds_its_own_warped_copy_from_coarse_to_fine(head: PreparedFace
     away = np.linalg.norm(fitted.vertices - target.vertices, axis=1)[visible(head.skin)]
     assert away.mean() < 0.02
     assert fitted.residual[fitted.valid].mean() < 2e-4
+
+
+def test_a_face_fitted_onto_itself_stays(head: PreparedFace) -> None:
+    fitted = fit_template(head.skin, head.skin, labels=(head.labels.values, head.labels.values))
+    assert np.abs(fitted.vertices - head.skin.vertices).max() < 1e-9
