@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cloning.detect.confidence import confidences, describe
-from cloning.detect.head import SAMPLES, Head, face_model, facing, find_pose, isolate, part, settle
+from cloning.detect.head import SAMPLES, Head, facing, find_pose, isolate, settle
 from cloning.detect.inside import inner_points
+from cloning.detect.model import FaceTemplate, Source, ready
 from cloning.detect.rules import OPEN, by_rule
 from cloning.detect.samples import sample
 from cloning.detect.search import Pose
@@ -20,13 +21,12 @@ from cloning.similarity import fit_similarity
 from cloning.surface import Surface, build_surface
 from cloning.template.closest import TriangleSearch
 from cloning.template.fitting import BENDING, Schedule, fit_template
-from cloning.visibility import visible
-from fba.arrays import Bools, Floats, Ints
+from fba.arrays import Floats, Ints
 from fba.errors import LandmarkError
 from fba.feature_points import FeaturePoint, FeaturePoints, feature_point_definitions
 from fba.findings import Finding
 from fba.landmark_checks import pairs
-from fba.scene import FaceScene, Role
+from fba.scene import FaceScene
 
 DETECTORS = ("auto", "xiang")
 
@@ -37,12 +37,8 @@ FACE_SCORE = 0.74
 ENOUGH = 4
 """With so many given points the head's place is taken from them."""
 
-HEAD, FACE = (-2.7, -10.0), (-2.2, -1.0)
-"""y and z, in eye separations from the eyes, below which the template ends: in the neck, since necks differ in length
-and end anywhere; for the first fit before the ears, which the rules do not need."""
-
-FIT = replace(BENDING, k_b=(1e-2, 1e-4), k_c=(3.0, 30.0), steps=10)
-FIRST = replace(FIT, steps=8)
+FIT = replace(BENDING, k_b=(1e-2, 1e-4), k_c=(3.0, 30.0), steps=6)
+FIRST = replace(FIT, steps=5)
 """Stiffer than the fit that carries motion: nobody has confirmed a point yet, and on coarse masks a soft template
 runs into folds (points up to 1.3 eye separations off on a mask of 468 vertices, 0.6 with this). On dense heads both
 place points equally well. The first fit is only a guess."""
@@ -80,14 +76,6 @@ class Detection:
     findings: tuple[Finding, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class _Source:
-    """A source's skin, the middle between its pupils at the origin, and which of its vertices are seen."""
-
-    skin: Surface
-    outside: Bools
-
-
 def detect_points(
     scene: FaceScene,
     source: PreparedFace,
@@ -114,11 +102,11 @@ def detect_points(
         raise LandmarkError(f"there is no detector '{detector}'; choose one of {', '.join(DETECTORS)}")
     tell = progress or (lambda stage, share: None)
     tell("searching the face", 0.0)
-    skin = _centred(source.skin)
-    model = _Source(skin, _outside(source))
+    model = ready(source)
+    skin = model.skin
     surface, unit = _whole(scene)
     clicked = {} if given is None else {key: p / unit for key, p in given.positions(scene).items()}
-    head = _head(surface, skin, clicked, scene.name)
+    head = _head(surface, model, clicked, scene.name)
     known = {key: head.pose.apply(p[None])[0] for key, p in clicked.items()}
     tell("fitting the face", 0.4)
     places, ruled, residual = _DETECT[detector](head, model, known)
@@ -130,9 +118,9 @@ def detect_points(
     return Detection(found, head.pose.score, describe(found, head.pose.score, scene.name))
 
 
-def _head(surface: Surface, skin: Surface, clicked: Mapping[str, Floats], name: str) -> Head:
+def _head(surface: Surface, source: Source, clicked: Mapping[str, Floats], name: str) -> Head:
     """Find the head, from the given points where there are enough."""
-    model = face_model(skin)
+    model, skin = source.model, source.skin
     shared = [key for key in clicked if key in skin.positions]
     if len(shared) >= ENOUGH:
         way = fit_similarity(np.array([clicked[i] for i in shared]), np.array([skin.positions[i] for i in shared]))
@@ -154,16 +142,15 @@ def _head(surface: Surface, skin: Surface, clicked: Mapping[str, Floats], name: 
 
 
 def _auto(
-    head: Head, source: _Source, known: Mapping[str, Floats]
+    head: Head, source: Source, known: Mapping[str, Floats]
 ) -> tuple[dict[str, Floats], dict[str, float], dict[str, float]]:
     """Fit the face without landmarks, then rules, then fit the head to what the rules have found."""
     skin = source.skin
-    guess, _ = _fitted(head, _template(source, FACE), known, FIRST)
+    guess, _ = _fitted(head, source.face, known, FIRST)
     guess = _evened({**guess, **known}, known, _start(head, skin))
-    offsets = {key: skin.positions[key] - place for key, place in by_rule(skin, skin.positions).items()}
-    ruled = {k: p + offsets[k] for k, p in by_rule(head.skin, guess).items() if k in offsets}
+    ruled = {k: p + source.offsets[k] for k, p in by_rule(head.skin, guess).items() if k in source.offsets}
     ruled = {k: p for k, p in ruled.items() if _both_sides(k, ruled) and k not in known}
-    places, residual = _fitted(head, _template(source, HEAD), {**ruled, **known}, FIT)
+    places, residual = _fitted(head, source.head, {**ruled, **known}, FIT)
     differ = {key: float(np.linalg.norm(place - guess[key])) for key, place in ruled.items()}
     places = _evened({**places, **ruled, **known}, known, guess)
     parted = _parted(places, known, _start(head, skin))
@@ -220,10 +207,10 @@ def _evened(places: Mapping[str, Floats], known: Mapping[str, Floats], near: Map
 
 
 def _xiang(
-    head: Head, source: _Source, known: Mapping[str, Floats]
+    head: Head, source: Source, known: Mapping[str, Floats]
 ) -> tuple[dict[str, Floats], dict[str, float], dict[str, float]]:
     """The published landmarks, the elastic fit to them, and both once more."""
-    template = _template(source, HEAD)
+    template = source.head
     surface = template.surface
     marks = detect_landmarks(surface, _stretched(head, surface), head.skin)
     deformed = _deformed(head, template, {**marks, **known}, FIT)
@@ -233,21 +220,6 @@ def _xiang(
 
 
 _DETECT = {"auto": _auto, "xiang": _xiang}
-
-
-def _outside(source: PreparedFace) -> Bools:
-    """Which of the skin's vertices are seen; eyeballs, teeth and tongue hide what lies behind them."""
-    roles = (Role.EYE_LEFT, Role.EYE_RIGHT, Role.UPPER_TEETH, Role.LOWER_TEETH, Role.TONGUE)
-    names = [s.name for role in roles for s in source.scene.with_role(role)]
-    joined = build_surface(source.scene, FeaturePoints({}), [*source.skin.shapes, *names], source.fapu.es0)
-    return visible(joined)[: source.skin.vertex_count]
-
-
-def _centred(skin: Surface) -> Surface:
-    """A source's skin with the middle between its pupils at the origin."""
-    middle = 0.5 * (skin.positions["3.5"] + skin.positions["3.6"])
-    positions = {key: place - middle for key, place in skin.positions.items()}
-    return replace(skin, vertices=skin.vertices - middle, positions=positions)
 
 
 def _whole(scene: FaceScene) -> tuple[Surface, float]:
@@ -262,37 +234,15 @@ def _whole(scene: FaceScene) -> tuple[Surface, float]:
     return build_surface(scene, FeaturePoints({}), names, unit), unit
 
 
-@dataclass(frozen=True, eq=False)
-class _Template:
-    """A part of the source's skin, and which of its vertices look for partners."""
-
-    surface: Surface
-    seen: Bools
-
-
-def _template(source: _Source, lowest: tuple[float, float]) -> _Template:
-    """What of the source's skin is seen, and what holds feature points: the rest finds no partner.
-
-    Parameters
-    ----------
-    lowest : y and z below which the template ends.
-    """
-    skin, seen = source.skin, source.outside
-    wanted = seen & np.all(skin.vertices[:, 1:] > lowest, axis=1)
-    for vertices, _ in skin.points.values():
-        wanted[vertices] = True
-    indices, offsets = skin.polygons
-    surface, ids = part(skin, np.maximum.reduceat(wanted[indices], offsets[:-1]))
-    return _Template(surface, seen[ids])
-
-
-def _deformed(head: Head, template: _Template, marks: Mapping[str, Floats], schedule: Schedule) -> Floats:
+def _deformed(head: Head, template: FaceTemplate, marks: Mapping[str, Floats], schedule: Schedule) -> Floats:
     """The template's vertices on the head."""
     surface = template.surface
     target = replace(head.skin, positions=dict(marks))
     ids = [key for key in marks if key in surface.points]
     start = _stretched(head, surface)
-    return fit_template(surface, target, ids, schedule=schedule, visible=template.seen, start=start).vertices
+    k_c = schedule.k_c[0] / template.share, schedule.k_c[1] / template.share
+    rules = replace(schedule, k_c=k_c)
+    return fit_template(surface, target, ids, schedule=rules, visible=template.pulled, start=start).vertices
 
 
 def _stretched(head: Head, template: Surface) -> Floats:
@@ -303,7 +253,7 @@ def _stretched(head: Head, template: Surface) -> Floats:
 
 
 def _fitted(
-    head: Head, template: _Template, marks: Mapping[str, Floats], schedule: Schedule
+    head: Head, template: FaceTemplate, marks: Mapping[str, Floats], schedule: Schedule
 ) -> tuple[dict[str, Floats], dict[str, float]]:
     """Every feature point through the fitted template, and how far from the skin the template was there."""
     vertices = _deformed(head, template, marks, schedule)

@@ -45,6 +45,9 @@ and lashes fall out."""
 BALL = 0.12
 """Largest error of an eyeball as a sphere, as part of its radius: a cornea stands out by about that."""
 
+SPAN = 1.2
+"""Width and height of an eyeball in radii, at least: wet edges of lids lie on a sphere too, but cover little of it."""
+
 BALL_SIZES = (0.08, 0.45)
 BALL_SIZE = 0.2
 """Radii of eyeballs in eye separations: 0.2 in people, up to twice that in cartoons."""
@@ -151,7 +154,7 @@ def facing(points: Samples, pose: Pose) -> tuple[Samples, bool]:
     reversed : most normals of the face look inwards and were turned.
     """
     local = pose.apply(points.points)
-    near = np.flatnonzero(np.all(np.abs(local - (0.0, -0.5, -0.3)) < ROOM, axis=1))
+    near = np.flatnonzero(_within(local, (0.0, -0.5, -0.3)))
     if not len(near):
         return points.subset(near), False
     view = points.subset(near[seen(local[near], GRID, 2.0 * GRID)])
@@ -159,6 +162,13 @@ def facing(points: Samples, pose: Pose) -> tuple[Samples, bool]:
     if ahead.mean() >= 0.0:
         return view, False
     return Samples(view.points, -view.normals, view.triangles), True
+
+
+def _within(points: Floats, middle: tuple[float, float, float]) -> Bools:
+    """Points that lie in the box around a head."""
+    inside = [np.abs(points[:, k] - middle[k]) < ROOM[k] for k in range(3)]
+    found: Bools = inside[0] & inside[1] & inside[2]
+    return found
 
 
 def _choices(surface: Surface) -> list[Samples]:
@@ -178,7 +188,7 @@ def isolate(surface: Surface, pose: Pose, inside_out: bool, model: Model) -> Hea
     if inside_out:
         whole = _reversed(whole)
     piece = whole.components()
-    near = np.all(np.abs(vertices - (0.0, -0.5, -0.7)) < ROOM, axis=1)
+    near = _within(vertices, (0.0, -0.5, -0.7))
     eyeballs = _eyeballs(whole, piece, near)
     balls = [piece[b.vertices[0]] for b in eyeballs if b is not None]
     kept = np.isin(piece, _skin_pieces(whole, piece, near, model, balls)) & near
@@ -222,7 +232,7 @@ def _eyeballs(whole: Surface, piece: Ints, near: Bools) -> tuple[Eyeball | None,
         # The front alone: many eyes are half balls with a flat back.
         ahead = places[places[:, 2] > places[:, 2].mean()]
         center, radius, error = fit_sphere(ahead if len(ahead) >= 8 else places)
-        fits = error < BALL * radius and BALL_SIZES[0] < radius < BALL_SIZES[1]
+        fits = error < BALL * radius and BALL_SIZES[0] < radius < BALL_SIZES[1] and size[:2].min() > SPAN * radius
         if fits and 0.2 < abs(center[0]) < 0.9 and abs(center[1]) < 0.5 and -0.9 < center[2] < 0.3:
             found.append((error / radius + 0.1 * abs(np.log(radius / BALL_SIZE)), Eyeball(center, radius, ids)))
     sides = [[row for row in found if side * row[1].center[0] > 0.0] for side in (1.0, -1.0)]

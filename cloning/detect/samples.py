@@ -67,18 +67,17 @@ def depth_map(flat: Floats, depth: Floats, low: Floats, cell: float, shape: tupl
     low : (2,) lower left corner.
     shape : rows (up), columns (right).
     """
-    cells = np.floor((flat - low) / cell).astype(np.int64)
-    inside = np.all((cells >= 0) & (cells < (shape[1], shape[0])), axis=1)
+    column, row = (np.floor((flat[:, k] - low[k]) / cell).astype(np.int64) for k in range(2))
+    inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
     picture = np.full(shape[0] * shape[1], -np.inf)
-    np.maximum.at(picture, cells[inside, 1] * shape[1] + cells[inside, 0], depth[inside])
+    np.maximum.at(picture, row[inside] * shape[1] + column[inside], depth[inside])
     return picture.reshape(shape)
 
 
 def seen(points: Floats, cell: float, behind: float) -> Bools:
     """Which points are seen from +z: not more than `behind` behind the foremost point of their cell."""
-    low = points[:, :2].min(axis=0)
-    size = np.ceil((points[:, :2].max(axis=0) - low) / cell).astype(int) + 1
-    picture = depth_map(points[:, :2], points[:, 2], low, cell, (int(size[1]), int(size[0])))
-    cells = np.floor((points[:, :2] - low) / cell).astype(np.int64)
-    front: Bools = points[:, 2] > picture[cells[:, 1], cells[:, 0]] - behind
+    low = np.array([points[:, k].min() for k in range(2)])
+    column, row = (np.floor((points[:, k] - low[k]) / cell).astype(np.int64) for k in range(2))
+    picture = depth_map(points[:, :2], points[:, 2], low, cell, (int(row.max()) + 1, int(column.max()) + 1))
+    front: Bools = points[:, 2] > picture[row, column] - behind
     return front

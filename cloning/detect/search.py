@@ -95,8 +95,9 @@ def search(target: Samples, template: Template, count: int) -> list[Pose]:
     for gaze in sorted({tuple(t[2]) for t in turns}):
         same = [t for t in turns if tuple(t[2]) == gaze]
         view = (target.points - middle) @ same[0].T
+        box = np.array([view[:, :2].min(axis=0), view[:, :2].max(axis=0)])
         for scale in (WIDEST / extent) * STEP ** np.arange(steps):
-            picture = _Picture(scale * view, same[0], max(template.mask.shape))
+            picture = _Picture(view, scale, box, same[0], max(template.mask.shape))
             for turn in same:
                 found += [
                     Pose(turn, scale, -turn @ same[0].T @ place - scale * turn @ middle, score)
@@ -109,12 +110,13 @@ def search(target: Samples, template: Template, count: int) -> list[Pose]:
 class _Picture:
     """A depth picture of the target from one side at one scale."""
 
-    def __init__(self, view: Floats, axes: Floats, margin: int) -> None:
+    def __init__(self, view: Floats, scale: float, box: Floats, axes: Floats, margin: int) -> None:
         """Draw it.
 
         Parameters
         ----------
-        view : points, turned and scaled.
+        view : points, turned; not yet scaled.
+        box : (2, 2) lower left and upper right corner of `view`.
         axes : (3, 3) the turn; its rows are the picture's right, up and the way to the viewer.
         margin : cells added so that a correlation does not wrap round.
         """
@@ -122,9 +124,9 @@ class _Picture:
         from scipy.ndimage import maximum_filter
 
         self.axes = axes
-        self.low = view[:, :2].min(axis=0) - 1.0
-        columns, rows = (int(n) for n in np.ceil((view[:, :2].max(axis=0) + 1.0 - self.low) * CELLS))
-        some = view[: max(6 * rows * columns, 20_000)]
+        self.low = scale * box[0] - 1.0
+        columns, rows = (int(n) for n in np.ceil((scale * box[1] + 1.0 - self.low) * CELLS))
+        some = scale * view[: max(6 * rows * columns, 20_000)]
         depth = depth_map(some[:, :2], some[:, 2], self.low, 1.0 / CELLS, (rows, columns))
         mask = depth > maximum_filter(depth, 2 * CELLS - 1) - BACKGROUND
         self.base = float(depth[mask].mean())
@@ -157,13 +159,15 @@ class _Picture:
         size = np.array(parts[0].shape[::-1], np.float64)
         rows, columns = (max(n - k + 1, 0) for n, k in zip(self.shape, parts[0].shape, strict=True))
 
-        def against(image: int, part: int) -> Floats:
-            whole: Floats = irfft2(self.images[image] * kernels[part], self.padded)
+        def against(*pairs: tuple[float, int, int]) -> Floats:
+            # Sums of correlations are formed before the way back, which costs most.
+            spectrum = np.sum([factor * self.images[image] * kernels[part] for factor, image, part in pairs], axis=0)
+            whole: Floats = irfft2(spectrum, self.padded)
             return whole[:rows, :columns]
 
-        count = np.maximum(against(0, 0), 1.0)
-        depth = (against(1, 0) - against(0, 1)) / count
-        error = against(2, 0) - 2.0 * against(1, 1) + against(0, 2) - count * depth**2
+        count = np.maximum(against((1.0, 0, 0)), 1.0)
+        depth = against((1.0, 1, 0), (-1.0, 0, 1)) / count
+        error = against((1.0, 2, 0), (-2.0, 1, 1), (1.0, 0, 2)) - count * depth**2
         # A cell where the target shows nothing is as bad as one without any relief.
         cells = int(template.mask.sum())
         return 1.0 - error / template.whole - (cells - count) / cells, depth, size
