@@ -17,12 +17,14 @@ from cloning.source import source_motions, turning_keys
 from cloning.target import target_points
 from cloning.transfer import FaceTransfer, build_face_transfer
 from fat.build import build_tables
+from fat.compact import compact
 from fat.face import AnimatableFace
 from fat.motion import FaceMotion
 from fat.rig import EYE_FAPS, HEAD_FAPS, rig_eye, rig_head
-from fat.tables import FaceDefTransform
+from fat.tables import FaceDefTables, FaceDefTransform
 from fba.arrays import Floats
 from fba.errors import CloningError
+from fba.fapu import Fapu
 from fba.feature_points import FeaturePoints
 from fba.findings import Finding
 from fba.orientation import to_file_order
@@ -32,6 +34,12 @@ from fba.shapes import ShapeSet
 Progress = Callable[[str, float], None]
 Key = tuple[int, int]
 T = TypeVar("T")
+
+STILL = 1e-4
+"""Vertices that never move farther than this, in eye separations (six thousandths of a millimetre), are left out ..."""
+
+ROUNDING = 1e-5
+"""... and written numbers are this exact at the outermost border of a table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +68,7 @@ def clone(
     backend: str = DEFAULT_BACKEND,
     as_published: bool = False,
     faps: Collection[int] | None = None,
+    exact: bool = False,
     progress: Progress | None = None,
 ) -> AnimatableFace:
     """Clone every motion of a source onto a face.
@@ -67,7 +76,7 @@ def clone(
     See `clone_with_report`.
     """
     return clone_with_report(
-        source, onto, landmarks, backend=backend, as_published=as_published, faps=faps, progress=progress
+        source, onto, landmarks, backend=backend, as_published=as_published, faps=faps, exact=exact, progress=progress
     )[0]
 
 
@@ -79,6 +88,7 @@ def clone_with_report(
     backend: str = DEFAULT_BACKEND,
     as_published: bool = False,
     faps: Collection[int] | None = None,
+    exact: bool = False,
     progress: Progress | None = None,
 ) -> tuple[AnimatableFace, CloneReport]:
     """Clone every motion of a source onto a face, and say what was done.
@@ -91,6 +101,8 @@ def clone_with_report(
     backend : name of a registered backend.
     as_published : run the paper's own method instead of the repaired default.
     faps : FAP numbers to clone, 1 (visemes) and 2 (expressions) among them; None = all.
+    exact : keep every border, vertex and digit; otherwise the tables are without what nobody sees (`fat.compact`),
+        and a third as large. Published mode is always exact.
     progress : called with (stage, share done).
 
     Returns
@@ -122,7 +134,8 @@ def clone_with_report(
     offsets = _carry(transfer, [m.offsets for m in motions], stages)
     cloned = [replace(m, offsets=o) for m, o in zip(motions, offsets, strict=True) if o]
     rigged, transforms, said = _rig(yours, turning, wanted, as_published)
-    tables = stages.run("tables", lambda: build_tables(rigged, yours.fapu, cloned, transforms))
+    whole = exact or as_published
+    tables = stages.run("tables", lambda: _tables(rigged, yours.fapu, cloned, transforms, whole))
     if not len(tables):
         raise CloningError(
             f"the source '{source.scene.name}' holds no motion of these FAPs that '{yours.scene.name}' can take"
@@ -253,6 +266,18 @@ def _rig(
     return scene, kept, findings
 
 
+def _tables(
+    scene: FaceScene,
+    fapu: Fapu,
+    motions: Sequence[FaceMotion],
+    transforms: Mapping[Key, Sequence[FaceDefTransform]],
+    exact: bool,
+) -> FaceDefTables:
+    if exact:
+        return build_tables(scene, fapu, motions, transforms)
+    return compact(build_tables(scene, fapu, motions, transforms, threshold=STILL), fapu, rounding=ROUNDING)
+
+
 def _no_node(what: str, numbers: Sequence[int], where: str) -> Finding:
     listed = ", ".join(map(str, numbers))
     return Finding("warning", "no-transform", f"{what} has no transform that moves; FAPs {listed} are left out", where)
@@ -278,4 +303,5 @@ def _report(
         dict(transfer.skin.parameters),
         (*about_source, *target.findings, *transfer.findings, *transfer.inexact(), *said),
         dict(stages.timings),
+        target.parts.rows,
     )

@@ -45,11 +45,12 @@ def compact(
     for table in tables:
         unit = fapu.unit(fap(table.fap_id).unit) / fapu.es0
         largest: dict[int, float] = {}
-        for mesh in table.meshes:
-            for border, length in zip(mesh.interval_borders.tolist(), _lengths(_places(mesh)), strict=True):
+        placed = [(mesh, _places(mesh)) for mesh in table.meshes]
+        for mesh, places in placed:
+            for border, length in zip(mesh.interval_borders.tolist(), _lengths(places), strict=True):
                 largest[border] = max(largest.get(border, 0.0), float(length.max(initial=0.0)))
         limits = {border: max(unseen * length, small / unit) for border, length in largest.items()}
-        parts = (part for mesh in table.meshes for part in _thinned(mesh, limits))
+        parts = (part for mesh, places in placed for part in _thinned(mesh, places, limits))
         out.append(replace(table, meshes=tuple(_rounded(part, rounding / unit) for part in parts)))
     return FaceDefTables(tuple(out))
 
@@ -57,17 +58,18 @@ def compact(
 def _places(mesh: FaceDefMesh) -> Floats:
     """Accumulated displacements at the borders, (b, k, 3) in FAPU."""
     weights = interval_weights(mesh.interval_borders, mesh.interval_borders)
-    places: Floats = np.einsum("kic,bi->bkc", mesh.displacements.astype(np.float64), weights)
+    steps = np.ascontiguousarray(mesh.displacements.transpose(1, 0, 2), dtype=np.float64)
+    places: Floats = (weights @ steps.reshape(len(steps), -1)).reshape(len(weights), -1, 3)
     return places
 
 
 def _lengths(places: Floats) -> Floats:
-    lengths: Floats = np.linalg.norm(places, axis=2)
+    lengths: Floats = np.sqrt(np.einsum("bkc,bkc->bk", places, places))
     return lengths
 
 
-def _thinned(mesh: FaceDefMesh, limits: dict[int, float]) -> Iterator[FaceDefMesh]:
-    borders, places = mesh.interval_borders, _places(mesh)
+def _thinned(mesh: FaceDefMesh, places: Floats, limits: dict[int, float]) -> Iterator[FaceDefMesh]:
+    borders = mesh.interval_borders
     zero = int(np.searchsorted(borders, 0))
     allowed = np.array([limits[b] for b in borders.tolist()])
     few = np.unique([0, zero, borders.size - 1])
