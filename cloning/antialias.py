@@ -35,8 +35,9 @@ def edge_samples(
 ) -> Samples:
     """Samples along a target's own edges, at most `support` and at most half an edge away from their vertex.
 
-    Only edges that are much longer than the source's spacing get samples (a dense source on a coarse target
-    aliases; the reverse cannot), and only along edges that stay inside one label.
+    Only vertices whose edges are much longer on the whole than the source's around their place get samples, along
+    the longer ones (a dense source on a coarse target aliases; the reverse cannot, nor does the same mesh), and only
+    along edges that stay inside one label.
 
     Parameters
     ----------
@@ -45,12 +46,15 @@ def edge_samples(
     labels : (n,) labels of the target's vertices.
     source_spacing : (n,) length of the source's edges around the place of each vertex.
     """
+    ends = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    spacing = np.bincount(edges.ravel(), np.repeat(ends, 2), len(points))
+    coarse = spacing > DENSER * source_spacing * np.bincount(edges.ravel(), minlength=len(points))
     both = np.concatenate([edges, edges[:, ::-1]])
     both = both[labels[both[:, 0]] == labels[both[:, 1]]]
     owner, other = both[:, 0], both[:, 1]
     step = points[other] - points[owner]
     length = np.linalg.norm(step, axis=1)
-    kept = (length > DENSER * source_spacing[owner]) & (length > 1e-9)
+    kept = coarse[owner] & (length > DENSER * source_spacing[owner]) & (length > 1e-9)
     owner, other, step, length = owner[kept], other[kept], step[kept], length[kept]
     share = np.minimum(0.5, support / length)[:, None]
     turned = normals[owner] * (1.0 - share) + normals[other] * share
