@@ -9,7 +9,7 @@ import numpy as np
 from cloning.fill import HarmonicFill
 from cloning.locate import closest_on_triangles
 from cloning.surface import Surface, polygon_edges
-from fba.arrays import Floats, Ints
+from fba.arrays import Bools, Floats, Ints
 
 NEAR = 0.06
 """A piece rides on the skin where part of it is nearer than this, in eye separations."""
@@ -22,16 +22,19 @@ class Binding:
     """Binds a mesh to the skin below it, piece by piece.
 
     Vertices close to the skin take its motion; the rest of each piece continues it smoothly. Pieces that do not
-    touch the skin rest (they still turn with the head).
+    touch the skin rest (they still turn with the head), and so do those that must not bend.
     """
 
-    def __init__(self, vertices: Floats, indices: Ints, offsets: Ints, skin: Surface) -> None:
+    def __init__(
+        self, vertices: Floats, indices: Ints, offsets: Ints, skin: Surface, resting: Bools | None = None
+    ) -> None:
         """Find the attachment.
 
         Parameters
         ----------
         vertices : (n, 3) world coordinates, in eye separations.
         indices, offsets : its polygons.
+        resting : (n,) what rests though it may touch the skin; None = nothing.
         """
         from scipy.sparse import coo_array, csr_array
         from scipy.sparse.csgraph import connected_components
@@ -43,13 +46,14 @@ class Binding:
         count, piece = connected_components(graph, directed=False)
         nearest = np.full(count, np.inf)
         np.minimum.at(nearest, piece, distances)
+        if resting is not None:
+            nearest[piece[resting]] = np.inf
         root = (nearest[piece] < NEAR) & (distances <= nearest[piece] + ROOT)
         rows = np.flatnonzero(root)
         self.matrix: Any = csr_array(
             (weights[rows].ravel(), (np.repeat(rows, 3), skin.triangles[triangles[rows]].ravel())),
             shape=(n, skin.vertex_count),
         )
-        self.resting: int = int(np.sum(nearest >= NEAR))
         self._fill = HarmonicFill(vertices, edges, ~root)
 
     def apply(self, skin_motion: Floats) -> Floats:

@@ -14,6 +14,7 @@ from cloning.normalize import TONGUE, factors
 from cloning.parts import LOWER_TEETH, PUPILS, eye_center
 from cloning.prepare import PreparedFace
 from cloning.rigid import fit_rigid
+from cloning.similarity import fit_similarity
 from cloning.surface import polygon_edges
 from fba.arrays import Floats, Ints
 from fba.faps import Unit
@@ -26,8 +27,14 @@ RIGID = 0.02
 TONGUE_REACH = 0.12
 """A tongue vertex farther than this from the source's tongue after alignment takes its neighbours' motion (ES)."""
 
+MOUTH = ("2.1", "2.2", "2.3", "2.4", "2.5", "2.10", "8.1", "8.2", "9.15")
+"""By these a tongue without points of its own is laid into the source's mouth."""
+
 TOUCHING = 0.06
 """Gums nearer than this to teeth move with them, in eye separations."""
+
+BESIDE = 0.05
+"""Gums are farther than this from where the source's tongue lies, in eye separations; a tongue's tip touches teeth."""
 
 RIM, PASSES = 0.95, 4
 COARSER = 1.5
@@ -186,7 +193,7 @@ def tongue_mover(
     jaw : gives the (n_teeth, K, 3) offsets of the target's lower teeth, or None.
     """
     ids = [i for i in ("6.1", "6.2", "6.3", "6.4") if i in source.points and i in target.points]
-    places = _onto_tongue(source, target, mine, yours, ids)
+    places = _onto_tongue(source, target, yours, ids)
     es = source.fapu.es0
     triangles, weights, distances = nearest_on(places / es, mine.vertices / es, mine.triangles)
     corners = mine.triangles[triangles]
@@ -195,7 +202,8 @@ def tongue_mover(
     to_upper, _ = _to_body(yours, upper, target.fapu.es0)
     to_lower, tooth = _to_body(yours, lower, target.fapu.es0)
     near = distances < TONGUE_REACH
-    gums = ~near & (np.minimum(to_upper, to_lower) < TOUCHING)
+    gums = (distances > BESIDE) & (np.minimum(to_upper, to_lower) < TOUCHING)
+    near &= ~gums
     fill = HarmonicFill(yours.vertices, polygon_edges(yours.indices, yours.offsets), ~(near | gums))
 
     at_mine, at_yours = (_point_rows(f, b, ids) for f, b in ((source, mine), (target, yours)))
@@ -262,22 +270,11 @@ def _scales(goals: Floats, ratio: Floats, mine: Floats, yours: Floats, ids: Sequ
     return scales
 
 
-def _onto_tongue(source: PreparedFace, target: PreparedFace, mine: Body, yours: Body, ids: Sequence[str]) -> Floats:
-    """Target tongue vertices in the source's space: similarity by the tongue's points, or by bounding boxes."""
-    if len(ids) >= 3:
-        a = np.array([target.place(i) for i in ids])
-        b = np.array([source.place(i) for i in ids])
-        ca, cb = a.mean(axis=0), b.mean(axis=0)
-        u, s, vt = np.linalg.svd((b - cb).T @ (a - ca))
-        sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-        turn = (u * sign) @ vt
-        size = float((s * sign).sum() / max(float(((a - ca) ** 2).sum()), 1e-30))
-        moved: Floats = cb + size * (yours.vertices - ca) @ turn.T
-        return moved
-    boxes = [(b.vertices.min(axis=0), np.ptp(b.vertices, axis=0)) for b in (mine, yours)]
-    (low_s, size_s), (low_t, size_t) = boxes
-    scaled: Floats = low_s + (yours.vertices - low_t) * size_s / np.maximum(size_t, 1e-30)
-    return scaled
+def _onto_tongue(source: PreparedFace, target: PreparedFace, yours: Body, ids: Sequence[str]) -> Floats:
+    """Target tongue vertices in the source's space: similarity by the tongue's points, or by the mouth's."""
+    known = [key for key in (ids if len(ids) >= 3 else MOUTH) if key in source.points and key in target.points]
+    places, goals = (np.array([face.place(key) for key in known]) for face in (target, source))
+    return fit_similarity(places, goals).apply(yours.vertices)
 
 
 def _to_body(of: Body, other: Body | None, es0: float) -> tuple[Floats, Ints]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from cloning.surface import seam_links
-from fba.arrays import Floats, Ints
+from cloning.kinds import Kind, named
+from cloning.pieces import Pieces, find_pieces
+from fba.arrays import Floats
 from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.findings import Finding
 from fba.scene import FaceScene, Node, Role, Shape, Transform
@@ -22,27 +24,23 @@ INSIDE = (*PUPILS, *UPPER_TEETH, *LOWER_TEETH, *TONGUE)
 """Feature points that do not lie on the skin."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Pieces:
-    """All connected pieces of a scene.
+EYE_NAMES = r"eye ?balls?|\beyes?\b(?! ?(lid|socket|shadow|line|brow|lash))|cornea|\biris|sclera"
+TEETH_NAMES = r"teeth|tooth|denture|\bgums?\b|gingiva"
+TONGUE_NAMES = r"tongue"
+UPPER_NAMES, LOWER_NAMES = r"upper|\btop|maxill", r"lower|bottom|mandib|\bjaw"
+"""Words by which files call the parts, see `cloning.pieces.words`."""
 
-    Attributes
-    ----------
-    of_vertex : shape name -> (n,) number of the piece of each vertex.
-    vertices : world vertices of each piece.
-    """
-
-    of_vertex: Mapping[str, Ints]
-    vertices: Sequence[Floats]
+NEAR_PUPIL = 0.3
+"""A piece called an eye has its middle at most this far from a pupil, in eye separations."""
 
 
 def split_parts(scene: FaceScene, points: FeaturePoints) -> tuple[FaceScene, FeaturePoints, list[Finding]]:
     """Give every shape a role, and cut shapes that hold several parts into one shape for each role.
 
-    Skin is what carries most feature points, together with every other piece that carries one of the skin's.
-    Eyes are the pieces around the pupils 3.5 and 3.6, cornea and iris layers included; teeth and tongue are
-    found by their feature points, upper teeth first. Everything else stays "other". A scene that already has a
-    skin keeps its roles.
+    Skin is what carries most feature points, together with every other piece that carries one of the skin's, but
+    for glasses. Eyes are the pieces around the pupils 3.5 and 3.6, cornea and iris layers included; teeth and tongue
+    are found by their feature points, upper teeth first. What feature points do not find is found by what the file
+    calls it. Everything else stays "other". A scene that already has a skin keeps its roles.
 
     Parameters
     ----------
@@ -56,7 +54,7 @@ def split_parts(scene: FaceScene, points: FeaturePoints) -> tuple[FaceScene, Fea
     """
     if scene.with_role(Role.SKIN):
         return scene, points, missing_parts(scene)
-    pieces = _pieces(scene)
+    pieces = find_pieces(scene)
     roles = _roles(scene, points, pieces)
     change: dict[str, tuple[Shape, ...]] = {}
     moved: dict[str, dict[int, tuple[str, int]]] = {}
@@ -120,31 +118,7 @@ def eye_center(vertices: Floats, pupil: Floats | None) -> Floats:
     return middle
 
 
-def _pieces(scene: FaceScene) -> _Pieces:
-    """Connected pieces; seams where borders meet at the same places are closed inside each shape."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    of_vertex: dict[str, Ints] = {}
-    vertices: list[Floats] = []
-    for shape in scene.shapes:
-        world = scene.world_vertices(shape.name)
-        scale = max(float(np.ptp(world, axis=0).max()), 1e-30)
-        links = seam_links(world / scale, shape.mesh.indices, shape.mesh.offsets)
-        mesh = shape.mesh
-        first = np.repeat(mesh.indices[mesh.offsets[:-1]], mesh.arities)
-        a = np.concatenate([first, links[:, 0]])
-        b = np.concatenate([mesh.indices, links[:, 1]])
-        n = mesh.vertex_count
-        count, labels = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)
-        of_vertex[shape.name] = labels + len(vertices)
-        order = np.argsort(labels, kind="stable")
-        stops = np.cumsum(np.bincount(labels, minlength=count))[:-1]
-        vertices += [world[ids] for ids in np.split(order, stops)]
-    return _Pieces(of_vertex, vertices)
-
-
-def _roles(scene: FaceScene, points: FeaturePoints, pieces: _Pieces) -> list[Role]:
+def _roles(scene: FaceScene, points: FeaturePoints, pieces: Pieces) -> list[Role]:
     """The role of each piece."""
     roles = [Role.OTHER] * len(pieces.vertices)
     held = {
@@ -154,21 +128,29 @@ def _roles(scene: FaceScene, points: FeaturePoints, pieces: _Pieces) -> list[Rol
     }
     votes = np.bincount([k for key, k in held.items() if key not in INSIDE], minlength=len(roles))
     main = int(np.argmax(votes))
-    for k in np.flatnonzero(votes):
-        roles[int(k)] = Role.SKIN
+    for k in np.flatnonzero(votes).tolist():
+        if k == main or named(pieces.names[k]) is not Kind.GLASSES:
+            roles[k] = Role.SKIN
     positions = points.positions(scene)
     for ids, role in ((UPPER_TEETH, Role.UPPER_TEETH), (LOWER_TEETH, Role.LOWER_TEETH), (TONGUE, Role.TONGUE)):
         for key in ids:
-            if key in held and roles[held[key]] is Role.OTHER:
+            if key in held and roles[held[key]] is Role.OTHER and _may_be(role, pieces.names[held[key]]):
                 roles[held[key]] = role
     for pupil, role in PUPILS.items():
         if pupil in positions:
             _mark_eye(positions[pupil], held.get(pupil), role, roles, pieces, main)
+    _mark_named(positions, roles, pieces)
     _grow_teeth(roles, pieces)
     return roles
 
 
-def _mark_eye(pupil: Floats, piece: int | None, role: Role, roles: list[Role], pieces: _Pieces, main: int) -> None:
+def _may_be(role: Role, name: str) -> bool:
+    """False where the file calls a piece tongue that a point takes for teeth, or the other way round."""
+    tongue, teeth = (re.search(pattern, name) is not None for pattern in (TONGUE_NAMES, TEETH_NAMES))
+    return not (tongue if role is not Role.TONGUE else teeth and not tongue)
+
+
+def _mark_eye(pupil: Floats, piece: int | None, role: Role, roles: list[Role], pieces: Pieces, main: int) -> None:
     """Mark the eyeball below a pupil and the layers around the same centre."""
     if piece is None or piece == main:
         near = [
@@ -193,6 +175,31 @@ def _mark_eye(pupil: Floats, piece: int | None, role: Role, roles: list[Role], p
             roles[k] = role
 
 
+def _mark_named(positions: Mapping[str, Floats], roles: list[Role], pieces: Pieces) -> None:
+    """Eyes, teeth and tongue that are called so, where no feature point has found them."""
+    free = [k for k, role in enumerate(roles) if role is Role.OTHER and len(pieces.vertices[k]) >= 4]
+    middles = {k: 0.5 * (pieces.vertices[k].min(axis=0) + pieces.vertices[k].max(axis=0)) for k in free}
+    es = float(np.linalg.norm(positions["3.5"] - positions["3.6"]))
+    for pupil, role in PUPILS.items():
+        if role not in roles:
+            for k in free:
+                close = float(np.linalg.norm((middles[k] - positions[pupil])[:2])) < NEAR_PUPIL * es
+                if close and named(pieces.names[k]) is None and re.search(EYE_NAMES, pieces.names[k]):
+                    roles[k] = role
+    line = 0.5 * float(positions["2.2"][1] + positions["2.3"][1])
+    for k in free:
+        name = pieces.names[k]
+        if roles[k] is Role.OTHER and re.search(TEETH_NAMES, name) and not re.search(TONGUE_NAMES, name):
+            lower = middles[k][1] < line
+            if re.search(UPPER_NAMES, name) or re.search(LOWER_NAMES, name):
+                lower = re.search(UPPER_NAMES, name) is None
+            roles[k] = Role.LOWER_TEETH if lower else Role.UPPER_TEETH
+    if Role.TONGUE not in roles:
+        for k in free:
+            if roles[k] is Role.OTHER and re.search(TONGUE_NAMES, pieces.names[k]):
+                roles[k] = Role.TONGUE
+
+
 def _ball(vertices: Floats) -> bool:
     """True for vertices on a sphere that they cover to a good part."""
     if len(vertices) < 12:
@@ -202,7 +209,7 @@ def _ball(vertices: Floats) -> bool:
     return bool(error < 0.12 * radius and sides.min() > 0.5 * radius and radius < 1.2 * sides.max())
 
 
-def _grow_teeth(roles: list[Role], pieces: _Pieces) -> None:
+def _grow_teeth(roles: list[Role], pieces: Pieces) -> None:
     """Give single teeth and gums beside a known tooth to the nearer jaw."""
     known = {
         role: [v for v, r in zip(pieces.vertices, roles, strict=True) if r is role]
@@ -216,7 +223,7 @@ def _grow_teeth(roles: list[Role], pieces: _Pieces) -> None:
     while True:
         grown = False
         for k, v in enumerate(pieces.vertices):
-            if roles[k] is not Role.OTHER:
+            if roles[k] is not Role.OTHER or named(pieces.names[k]) is not None:
                 continue
             best = min(
                 (

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cloning.kinds import NO_PARTS, Parts, tell_parts
 from cloning.labels import Labels, label
 from cloning.parts import INSIDE, split_parts
 from cloning.surface import Surface, build_surface
@@ -36,6 +37,7 @@ class PreparedFace:
     ----------
     scene : inside axes, every shape with its role.
     skin : all skin shapes as one surface, in eye separations.
+    parts : what every piece is and how it moves.
     """
 
     scene: FaceScene
@@ -44,6 +46,7 @@ class PreparedFace:
     skin: Surface
     labels: Labels
     findings: tuple[Finding, ...]
+    parts: Parts = NO_PARTS
 
     def place(self, key: str) -> Floats:
         """World position of a feature point, mesh units."""
@@ -80,8 +83,10 @@ def prepare(
             "give them as a face and barycentric coordinates, or as a vertex"
         )
     labels = label(skin)
-    found = (*findings, *turned, *missing, *derived, *_sealed(labels, scene.name))
-    return PreparedFace(scene, points, fapu, skin, labels, found)
+    parts = tell_parts(scene, skin, fapu.es0)
+    about = [parts.finding(scene.name)] if who == "target" else []
+    found = (*findings, *turned, *about, *missing, *derived, *_sealed(labels, scene.name))
+    return PreparedFace(scene, points, fapu, skin, labels, found, parts)
 
 
 def complete_points(

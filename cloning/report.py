@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from cloning.kinds import Part
 from fba.findings import Finding
 
 
@@ -23,6 +24,7 @@ class CloneReport:
     parameters : what the run was made with.
     findings : every step that fell short, in plain words.
     timings : stage -> seconds.
+    parts : what each piece of the target is, and how it moves.
     """
 
     backend: str
@@ -34,6 +36,7 @@ class CloneReport:
     parameters: Mapping[str, float | str | bool]
     findings: tuple[Finding, ...]
     timings: Mapping[str, float]
+    parts: tuple[Part, ...] = ()
 
     def to_dict(self) -> dict[str, object]:
         """Everything as plain dicts, lists, strings and numbers."""
@@ -49,6 +52,7 @@ class CloneReport:
                 {"severity": f.severity, "code": f.code, "message": f.message, "where": f.where} for f in self.findings
             ],
             "timings": dict(self.timings),
+            "parts": [part.to_dict() for part in self.parts],
         }
 
     def to_json(self) -> str:

@@ -184,7 +184,8 @@ def build_face_transfer(
         for shape in target.scene.with_role(Role.OTHER):
             if shape.mesh.vertex_count and shape.mesh.face_count:
                 vertices = target.scene.world_vertices(shape.name) / target.fapu.es0
-                bindings[shape.name] = Binding(vertices, shape.mesh.indices, shape.mesh.offsets, target.skin)
+                resting = target.parts.resting.get(shape.name)
+                bindings[shape.name] = Binding(vertices, shape.mesh.indices, shape.mesh.offsets, target.skin, resting)
     return FaceTransfer(
         source,
         target,
