@@ -4,8 +4,8 @@
                                    [--json FILE]
 
 Known are the shipped heads, two MakeHuman phenotypes as they are and in another topology, a whole MakeHuman body and
-ICT-FaceKit. Errors in eye widths. Ways: auto; xiang (the published detector); clicks (auto with six given points, which do not
-count). --pose turns, tilts, scales and shifts every file first and winds it inside out. Faces without known points
+ICT-FaceKit. Errors in eye widths. Ways: auto; xiang (the published detector); clicks (auto with six given points, which
+do not count). --pose turns, tilts, scales and shifts every file first and winds it inside out. Faces without known points
 show their confidence only; --sheets draws them.
 """
 

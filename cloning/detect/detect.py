@@ -11,6 +11,7 @@ from cloning.detect.confidence import confidences, describe
 from cloning.detect.head import SAMPLES, Head, facing, find_pose, isolate, settle
 from cloning.detect.inside import inner_points
 from cloning.detect.model import FaceTemplate, Source, ready
+from cloning.detect.neighbours import by_neighbours
 from cloning.detect.rules import OPEN, by_rule
 from cloning.detect.samples import sample
 from cloning.detect.search import Pose
@@ -153,6 +154,7 @@ def _auto(
     places, residual = _fitted(head, source.head, {**ruled, **known}, FIT)
     differ = {key: float(np.linalg.norm(place - guess[key])) for key, place in ruled.items()}
     places = _evened({**places, **ruled, **known}, known, guess)
+    places |= {k: p for k, p in by_neighbours(head.skin, skin, places).items() if k not in known}
     parted = _parted(places, known, _start(head, skin))
     return {**places, **parted}, differ, {**residual, **dict.fromkeys(parted, LIMITS)}
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cloning.detect.slices import Slicer
+from cloning.detect.slices import Slicer, deepest
 from cloning.surface import Surface
 from fba.arrays import Floats
 
@@ -77,11 +77,19 @@ class Extreme:
 
 EXTREMES = {
     "9.3": Extreme(0.0, 1.0, 0.25, 0.2),
-    "2.10": Extreme(0.0, 1.0, 0.15, 0.15),
     "2.1": Extreme(-0.87, 0.5, 0.2, 0.3),
 }
-"""Tip of the nose and chin boss: most forward. Chin: lowest, leaning forward by 30 degrees, since below the chin the
+"""Tip of the nose: most forward. Chin: lowest, leaning forward by 30 degrees, since below the chin the
 skin runs on nearly level to the neck."""
+
+WINGS = (("9.1", 1.0), ("9.2", -1.0))
+"""Borders of the nostrils, and their side."""
+
+WING_SLICES = 0.12
+"""How far above and below the guess the crease behind a nose wing is sought, in eye separations."""
+
+CREASE = 0.03
+"""A crease is at least this deep, in eye separations; measured 0.06 to 0.10."""
 
 FLAT = 0.01
 """A profile is flat over the heights at which it lies this little behind its extreme point, in eye separations."""
@@ -101,6 +109,7 @@ def by_rule(skin: Surface, guess: Mapping[str, Floats]) -> dict[str, Floats]:
     for opening in OPENINGS:
         found.update(_opening(skin, guess, opening))
     found.update(_profile(skin, guess))
+    found.update(_wings(skin, {**guess, **found}))
     return found
 
 
@@ -127,14 +136,39 @@ def _profile(skin: Surface, guess: Mapping[str, Floats]) -> dict[str, Floats]:
         if np.isfinite(depth):
             found[key] = np.array([middle, height, depth])
     if "9.3" in found:
-        # The corner between nose and upper lip: farthest behind the line from the lip to the tip.
+        # The corner between nose and upper lip.
         heights = np.linspace(float(guess["8.1"][1]), float(found["9.3"][1]), 100)
         depths = cut.profile(heights)
         if not np.isnan(depths).any():
-            way = np.array([heights[-1] - heights[0], depths[-1] - depths[0]])
-            behind = (depths - depths[0]) * way[0] - (heights - heights[0]) * way[1]
-            best = int(np.argmin(behind))
+            best, _ = deepest(heights, depths)
             found["9.15"] = np.array([middle, heights[best], depths[best]])
+    # The chin boss is half way between the fold under the lip and the chin: a receding chin has no foremost place.
+    heights = np.linspace(float(found.get("2.1", guess["2.1"])[1]), float(guess["8.2"][1]), 200)
+    depths = cut.profile(heights)
+    if not np.isnan(depths).any():
+        height = 0.5 * (float(heights[deepest(heights, depths)[0]]) + float(heights[0]))
+        found["2.10"] = np.array([middle, height, float(np.interp(height, heights, depths))])
+    return found
+
+
+def _wings(skin: Surface, guess: Mapping[str, Floats]) -> dict[str, Floats]:
+    """The borders of the nostrils: in the crease between nose wing and cheek, as high as the guess."""
+    found = {}
+    for key, side in WINGS:
+        place = guess[key]
+        slicer = Slicer(skin, place - 0.5, place + 0.5, axis=1)
+        # From the wing's side, past the nostril, to the cheek.
+        across = side * np.linspace(0.6 * side * place[0], side * place[0] + 0.2, 120)
+        depths = [slicer.at(place[1] + up).profile(across) for up in np.linspace(-WING_SLICES, WING_SLICES, 13)]
+        creases = [
+            (depth, best) for best, depth in (deepest(side * across, z) for z in depths if not np.isnan(z).any())
+        ]
+        if not creases or max(creases)[0] < CREASE:
+            continue
+        x = float(across[max(creases)[1]])
+        z = float(slicer.at(float(place[1])).profile(np.array([x]))[0])
+        if np.isfinite(z):
+            found[key] = np.array([x, place[1], z])
     return found
 
 

@@ -1,4 +1,4 @@
-"""Slices through a face at one x: the edges of lips and lids, and the profile."""
+"""Slices through a face: the edges of lips and lids, the profile, the wings of the nose."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TURN = 0.006
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """The cut of a surface with a plane x = constant.
+    """The cut of a surface with a plane x = constant; or y = constant, with x in place of every height below.
 
     Attributes
     ----------
@@ -78,20 +78,33 @@ class Slice:
         return np.where(np.isfinite(found), found, np.nan)
 
 
+def deepest(along: Floats, depths: Floats) -> tuple[int, float]:
+    """Where a curve lies farthest behind the line between its ends: the place's index, and how far."""
+    way = np.array([along[-1] - along[0], depths[-1] - depths[0]])
+    behind = ((along - along[0]) * way[1] - (depths - depths[0]) * way[0]) / np.linalg.norm(way)
+    best = int(np.argmax(behind))
+    return best, float(behind[best])
+
+
 class Slicer:
     """Cuts slices through a part of a surface."""
 
-    def __init__(self, surface: Surface, low: Floats, high: Floats) -> None:
-        """Keep the triangles whose bounding boxes reach into a box, given by its two corners (3,)."""
+    def __init__(self, surface: Surface, low: Floats, high: Floats, axis: int = 0) -> None:
+        """Keep the triangles whose bounding boxes reach into a box, given by its two corners (3,).
+
+        Parameters
+        ----------
+        axis : 0 for upright slices at one x, 1 for level ones at one y.
+        """
         corners = surface.vertices[surface.triangles]
         near = np.all((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low), axis=1)
         # Seams are closed: both copies of a vertex count as one.
         self._number = _welded(surface)
         self._triangles = surface.triangles[near]
-        self._vertices = surface.vertices
+        self._vertices = surface.vertices[:, [axis, 1 - axis, 2]]
 
     def at(self, x: float) -> Slice:
-        """The slice at one x."""
+        """The slice at one x (or y)."""
         above = self._vertices[self._triangles, 0] > x
         cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
         triangles, above = self._triangles[cut], above[cut]
