@@ -81,9 +81,9 @@ def read_stage(stage: Usd.Stage, path: Path) -> tuple[FaceScene, StageAxes, dict
     if not walk.meshes and root is None and default:
         # The default prim is not where the geometry is.
         nodes = walk.nodes(list(stage.GetPseudoRoot().GetFilteredChildren(_PREDICATE)))
-    if not walk.meshes:
-        raise InputFileError(f"{path} has no mesh; a face needs UsdGeomMesh prims")
     scene = FaceScene(tuple(nodes), frame, meters, path.name.split(".")[0], UsdDocument(axes.up_axis))
+    if not any(shape.mesh.face_count for shape in scene.shapes):
+        raise InputFileError(f"{path} has no mesh; a face needs UsdGeomMesh prims with polygons")
     if root is not None:
         return scene, axes, {shape.name: prim for shape, prim in zip(scene.shapes, walk.meshes, strict=True)}
     scene = _with_unique_names(scene)
@@ -110,8 +110,11 @@ class _Walk:
             return []
         nodes: list[Node] = []
         if prim.IsA(UsdGeom.Mesh):
-            self.meshes.append(prim)
-            nodes.append(read_mesh(prim, self._axes, name_of(prim)))
+            shape = read_mesh(prim, self._axes, name_of(prim))
+            # A mesh without points is a placeholder; nothing can lie on it.
+            if shape.mesh.vertex_count:
+                self.meshes.append(prim)
+                nodes.append(shape)
         nodes += self.nodes(list(prim.GetFilteredChildren(_PREDICATE)))
         if not self._is_transform(prim, bool(nodes)):
             return nodes

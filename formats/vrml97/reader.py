@@ -52,9 +52,9 @@ def assemble(statements: tuple[Statement, ...], name: str, findings: list[Findin
     wanted = referred_names(fdp, everything) if fdp is not None else set()
     reader = SceneReader(defs, wanted, findings)
     roots = reader.roots(kept)
-    if not any(isinstance(p, Shape) for p in reader.parts.values()):
+    if not any(isinstance(p, Shape) and p.mesh.face_count for p in reader.parts.values()):
         raise InputFileError(
-            f"{name}: there is no IndexedFaceSet in a Shape, so this file holds no polygon mesh "
+            f"{name}: there is no IndexedFaceSet with polygons in a Shape, so this file holds no polygon mesh "
             "(Inline files and the insides of PROTOs are not searched)"
         )
     metadata = read_metadata(parts.metadata, findings)

@@ -102,6 +102,9 @@ class SceneReader:
             kind = geometry.type if geometry is not None else "no geometry"
             self.say("info", "geometry", f"a Shape with {kind} is not a polygon mesh; it stays as it is", item)
             return None
+        if not mesh.vertex_count:
+            self.say("info", "geometry", "a Shape whose IndexedFaceSet has no points stays as it is", item)
+            return None
         return self.register(Shape(self.name(item), mesh, materials=(material_of(item, self.defs),)), item)
 
     def group(self, item: VrmlNode) -> Node | None:

@@ -174,6 +174,14 @@ def test_instances_and_references_are_read(path: Path) -> None:
         usd.read(path)
 
 
+def test_a_mesh_without_points_is_no_shape(path: Path) -> None:
+    empty = 'def Mesh "none" { point3f[] points = []\nint[] faceVertexCounts = []\nint[] faceVertexIndices = [] }'
+    scene = _read(path, f'def Xform "top" {{ {empty}\n def Mesh "skin" {{ {QUAD} }} }}')
+    assert [s.name for s in scene.shapes] == ["skin"]
+    with pytest.raises(InputFileError, match="with polygons"):
+        _read(path, f'def Xform "top" {{ {empty} }}')
+
+
 def test_a_mesh_below_a_mesh_keeps_its_place(path: Path) -> None:
     move = 'double3 xformOp:translate = (0, 0, 4)\nuniform token[] xformOpOrder = ["xformOp:translate"]'
     scene = _read(path, f'def Mesh "a" {{ {QUAD} {move}\n def Mesh "b" {{ {QUAD} {move} }} }}')

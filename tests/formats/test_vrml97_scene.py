@@ -11,7 +11,7 @@ import pytest
 
 from fat.rig import rig_eye, rig_head
 from fba import FaceScene, Frame, PolyMesh, Role, Shape, Transform
-from fba.errors import MeshError
+from fba.errors import InputFileError, MeshError
 from formats.vrml97 import VrmlDocument, parse, read, to_text, write
 from formats.vrml97.axes import from_file_axes, in_file_axes
 from formats.vrml97.tree import ExternProto, Proto, Route, Use, VrmlNode, definitions, walk
@@ -79,6 +79,16 @@ def test_names_tree_and_materials(tmp_path: Path) -> None:
     document = scene.document
     assert isinstance(document, VrmlDocument)
     assert any("Box is not a polygon mesh" in remark for remark in document.remarks)
+
+
+def test_a_shape_without_points_stays_in_the_file_alone(tmp_path: Path) -> None:
+    empty = "DEF None Shape { geometry IndexedFaceSet { coordIndex [ -1 -1 ] } }\n"
+    scene = read_scene(tmp_path, HEADER + empty + "DEF A Shape { " + face_set() + " }")
+    assert [s.name for s in scene.shapes] == ["A"]
+    write(scene, tmp_path / "out.wrl")
+    assert "DEF None Shape" in (tmp_path / "out.wrl").read_text()
+    with pytest.raises(InputFileError, match="no polygon mesh"):
+        read_scene(tmp_path, HEADER + empty)
 
 
 def test_unchanged_scene_is_written_as_it_was(tmp_path: Path) -> None:
