@@ -65,7 +65,7 @@ def run_demo(folder: Path, tell: Callable[[str, float], None]) -> list[DemoRow]:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     # Spawned, not forked: a forked graphics context does not work.
-    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_quietly) as pool:
+    with _one_interrupt(), ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_quietly) as pool:
         try:
             with _deaf_to_interrupts():
                 waiting = [pool.submit(make_head, name, folder) for name in HEADS]
@@ -80,6 +80,24 @@ def run_demo(folder: Path, tell: Callable[[str, float], None]) -> list[DemoRow]:
                     process.terminate()
                     process.join(0.1)
             raise
+
+
+@contextmanager
+def _one_interrupt() -> Iterator[None]:
+    """Hear the first Ctrl-C alone: a second one would stop the tidying up, and the heads would be finished first."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def leave(_number: int, _frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

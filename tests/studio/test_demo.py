@@ -93,7 +93,8 @@ def _all_gone(group: int) -> bool:
     return False
 
 
-def test_an_interrupt_ends_the_workers_too(tmp_path: Path) -> None:
+@pytest.mark.parametrize("times", [1, 2])
+def test_an_interrupt_ends_the_workers_too(tmp_path: Path, times: int) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "studio.cli", "demo", "-o", str(tmp_path)],
         stderr=subprocess.PIPE,
@@ -106,9 +107,12 @@ def test_an_interrupt_ends_the_workers_too(tmp_path: Path) -> None:
         time.sleep(0.05)
     assert len(_running(process.pid)) > 1
     time.sleep(1.0)
-    process.send_signal(signal.SIGINT)
+    for _ in range(times):
+        process.send_signal(signal.SIGINT)
+        # Two signals that arrive together are one.
+        time.sleep(0.004)
     _, said = process.communicate(timeout=30)
     assert process.returncode == Outcome.INTERRUPTED
     assert said.endswith("fba: interrupted\n")
     assert _all_gone(process.pid)
-    assert not [p for p in tmp_path.iterdir() if p.name.startswith(".")]
+    assert not [p for p in tmp_path.iterdir() if p.name.startswith(".") or p.suffix == ".png"]
