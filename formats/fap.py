@@ -172,7 +172,8 @@ class _Reader:
         """The mask, and whether a spurious 69th column is set."""
         tokens = _BLANKS.split(line[1])
         if len(tokens) not in (FAP_COUNT, FAP_COUNT + 1):
-            raise self._error(line[0], frame, f"the mask has {len(tokens)} entries; it must have {FAP_COUNT}")
+            cut = "; the file may be cut here" if len(tokens) < FAP_COUNT else ""
+            raise self._error(line[0], frame, f"the mask has {len(tokens)} entries; it must have {FAP_COUNT}{cut}")
         bad = next((t for t in tokens if t not in ("0", "1")), None)
         if bad is not None:
             raise self._error(line[0], frame, f"the mask holds '{bad[:20]}'; only 0 and 1 are allowed")

@@ -128,7 +128,7 @@ class Surfaces:
         if best[0] > SNAP_LIMIT * self._diagonal:
             part = 100.0 * best[0] / self._diagonal if self._diagonal else float("inf")
             raise LandmarkError(
-                f"{where} is off the surface: {best[0]:.4g} away, {part:.2g} % of the mesh's diagonal "
+                f"{where} is off the surface: {best[0]:.4g} away, {part:,.1f} % of the mesh's diagonal "
                 f"(at most {100 * SNAP_LIMIT:g} %); check the units and axes of the position"
             )
         return best[1]
