@@ -10,6 +10,7 @@ import numpy as np
 from cloning.backends import Anchored, SkinTransfer
 from cloning.bind import Binding
 from cloning.bodies import Body, Mover, body, eye_mover, teeth_mover, tongue_mover
+from cloning.closed_eyes import HALF, calm_lids, closed_lids
 from cloning.correct import Correction, correction
 from cloning.eyeballs import EyeGuard, eye_guard
 from cloning.normalize import ratios
@@ -81,6 +82,7 @@ class FaceTransfer:
     bindings : shape name -> how it rides on the skin.
     rims : closes the lids along their whole length; None in published mode.
     guard : keeps the skin off the eyeballs; None in published mode.
+    calm : (n,) share of their motion that is left to the lids of closed eyes; None where there are none.
     """
 
     source: PreparedFace
@@ -92,6 +94,7 @@ class FaceTransfer:
     bindings: Mapping[str, Binding]
     rims: RimFollower | None = None
     guard: EyeGuard | None = None
+    calm: Floats | None = None
     findings: tuple[Finding, ...] = ()
     tally: Tally = field(default_factory=Tally)
 
@@ -132,6 +135,9 @@ class FaceTransfer:
         moving = np.stack([self.source.skin.join(m) for m in motions], axis=1)
         skin = transfer.apply(moving)
         wanted = self._wanted(moving)
+        if self.calm is not None:
+            calm_lids(skin, self.calm)
+            wanted *= (self.target.skin.point_matrix(self.ids) @ self.calm > HALF)[:, None, None]
         before = wanted - self._at_points(skin)
         if self.correction is not None:
             self.tally.note_left(self.ids, self.correction.apply(skin, wanted) / self.target.fapu.es0)
@@ -196,6 +202,7 @@ def build_face_transfer(
         bindings,
         None if as_published else rim_follower(source, target),
         None if as_published else eye_guard(source, target, skin.carry),
+        None if as_published else closed_lids(target.skin, target.labels.closed),
         tuple(findings),
     )
 
@@ -233,7 +240,7 @@ def _pair(
                 Finding(
                     "warning",
                     f"source-no-{role.value.replace('_', '-')}",
-                    f"the source has no {words}, so the target's {words} get no motion of their own",
+                    f"the source has no {words}, so nothing moves the target's {words}",
                     target.scene.name,
                 )
             )

@@ -50,8 +50,12 @@ def clone(
     ] = None,
 ) -> None:
     """Clone the motion of an animatable face onto a plain mesh and write an animatable face."""
+    from cloning import backends
     from studio.cli.arguments import parse_faps
 
+    known = [b.name for b in backends()]
+    if backend not in known:
+        usage(f"--backend: there is no backend '{backend}'; choose one of: {', '.join(known)}")
     try:
         wanted = None if faps is None else parse_faps(faps)
     except ValueError as error:

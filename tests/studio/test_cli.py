@@ -73,6 +73,7 @@ def test_unknown_words_are_a_usage_error() -> None:
     assert fba("fly").exit_code == Outcome.USAGE
     assert fba("clone").exit_code == Outcome.USAGE
     assert fba("clone", "a.obj", "-o", "b.wrl", "--faps", "3,99").exit_code == Outcome.USAGE
+    assert fba("clone", "a.obj", "-o", "b.wrl", "--backend", "magic").exit_code == Outcome.USAGE
 
 
 def test_fap_lists() -> None:
