@@ -25,7 +25,8 @@ class SmoothNormals:
     def offsets(self, index: Ints, displacements: Floats) -> Floats:
         """Changes (k, 3) of the unit normals of vertices `index` (k,) when these are displaced (k, 3)."""
         vertices = self._mesh.vertices.copy()
-        np.add.at(vertices, index, displacements)
+        for axis in range(3):
+            vertices[:, axis] += np.bincount(index, displacements[:, axis], len(vertices))
         moved = np.zeros(len(vertices), dtype=bool)
         moved[index] = True
         a, b, c = self._mesh.triangles.T

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Floats, Floats32
+from formats.vrml97.decimals import decimals
 from formats.vrml97.tree import (
     BodyItem,
     Booleans,
@@ -33,6 +34,9 @@ _EXACT_POWER = 22
 
 _MOST_DIGITS = 9
 """Decimal digits that always tell two float32 apart."""
+
+_FEW = 10**6
+"""Decimals of up to six digits are as many different float32, so that none of them has a shorter text."""
 
 
 def print_tree(statements: tuple[Statement, ...], *, bt: bool = False) -> str:
@@ -143,18 +147,17 @@ def _nodes(value: Nodes, depth: int, out: list[str], bt: bool) -> None:
 
 
 def _numbers(value: Numbers, depth: int, out: list[str], bt: bool) -> None:
-    words = number_words(value.values, bt=bt)
-    if not value.many:
-        out.append(" ".join(words))
-    elif len(words) <= _PER_LINE:
-        out.append("[ " + " ".join(words) + " ]" if words else "[ ]")
-    else:
-        indent = "\n" + " " * (depth + 1)
-        out.append("[")
-        for start in range(0, len(words), _PER_LINE):
-            out.append(indent)
-            out.append(" ".join(words[start : start + _PER_LINE]))
-        out.append("\n" + " " * depth + "]")
+    if not value.many or value.values.size <= _PER_LINE:
+        words = " ".join(number_words(value.values, bt=bt))
+        out.append(words if not value.many else f"[ {words} ]" if words else "[ ]")
+        return
+    lines = decimals(value.values, _PER_LINE)
+    if lines is None:
+        words_of_all = number_words(value.values, bt=bt)
+        rows = range(0, len(words_of_all), _PER_LINE)
+        lines = "\n".join(" ".join(words_of_all[start : start + _PER_LINE]) for start in rows)
+    indent = "\n" + " " * (depth + 1)
+    out.append("[" + indent + lines.replace("\n", indent) + "\n" + " " * depth + "]")
 
 
 def _quoted(text: str) -> str:
@@ -182,7 +185,9 @@ def shortest_float32(values: Floats32) -> Floats:
     """
     flat = np.asarray(values, dtype=np.float32).reshape(-1)
     out = flat.astype(np.float64)
-    todo = np.flatnonzero(np.isfinite(out) & (out != 0))
+    rounded = _rounded_decimals(out, flat)
+    out = np.where(np.isnan(rounded), out, rounded)
+    todo = np.flatnonzero(np.isfinite(out) & (out != 0) & np.isnan(rounded))
     exponent = np.floor(np.log10(np.abs(out[todo]))).astype(np.int64)
     direct = (exponent <= _EXACT_POWER) & (exponent >= _MOST_DIGITS - _EXACT_POWER)
     rest = todo[~direct]
@@ -198,3 +203,18 @@ def shortest_float32(values: Floats32) -> Floats:
     for k in (*rest, *todo):
         out[k] = float(str(flat[k]))
     return out
+
+
+def _rounded_decimals(values: Floats, flat: Floats32) -> Floats:
+    """The decimals behind float32 that were rounded to a few places, all at once; NaN where a number was not."""
+    some = slice(None, None, max(1, len(flat) // 64))
+    for places in range(_MOST_DIGITS + 1):
+        power = 10.0**places
+        with np.errstate(over="ignore", invalid="ignore"):
+            if not np.array_equal((np.rint(values[some] * power) / power).astype(np.float32), flat[some]):
+                continue
+            whole = np.rint(values * power)
+            short = whole / power
+            found = (short.astype(np.float32) == flat) & (np.abs(whole) < _FEW)
+            return np.where(found, short, np.nan)
+    return np.full(len(values), np.nan)
