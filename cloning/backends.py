@@ -99,3 +99,5 @@ def find_backend(name: str) -> Backend:
 register_backend(Backend("fit", "elastic template and FAPU-scaled displacements", "cloning.fit"))
 register_backend(Backend("dt", "elastic template and deformation transfer (Xiang et al. 2008)", "cloning.dt"))
 register_backend(Backend("fmc", "Facial Motion Cloning (Pandzic 2001)", "cloning.fmc"))
+register_backend(Backend("vtc", "elastic template and vertex tents (Song et al.)", "cloning.vtc"))
+register_backend(Backend("vtc-image", "mesh image and vertex tents (Song et al.)", "cloning.vtc_image"))

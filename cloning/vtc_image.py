@@ -1,0 +1,125 @@
+"""Vertex tents by way of the mesh image: the paper's own correspondence.
+
+The target is resampled in the source's topology (see `cloning.resampling`), deforms there tent by tent, and takes the
+target's own vertices along. The default mode keeps only what can be seen of the source, sides of lips and lids apart,
+and feature points and amounts as MPEG-4 wants them. Published mode keeps what has a pixel, counts every tent the same
+and corrects nothing; `transferred` gives its result as the paper has it, with the source's polygons.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cloning.backends import SkinTransfer
+from cloning.local_transfer import BareTransfer, carrying_map, goal_transfer, map_measures
+from cloning.mesh_image import AROUND
+from cloning.prepare import PreparedFace
+from cloning.resampling import Polygons, Resampled, resample
+from cloning.shape_solver import ShapeTransfer
+from cloning.surface import Surface
+from cloning.template.correspondence import correspond
+from cloning.tents import tent_transfer
+from fba.arrays import Bools, Floats, Ints
+
+
+def build_transfer(source: PreparedFace, target: PreparedFace, as_published: bool) -> SkinTransfer:
+    """Prepare vertex tents over the mesh image between two faces."""
+    if as_published:
+        return build_published(source, target)[0]
+    skin = source.skin
+    copy = resample(skin, target.skin, outermost=True)
+    labels = source.labels.values, target.labels.values
+    places = correspond(copy.vertices, copy.triangles, target.skin, labels=labels)
+    skin_map = carrying_map(target.skin, places, without=target.labels.between)
+    vertices = _placed(copy, skin)
+
+    def factor(held: Floats, rows: Any) -> ShapeTransfer:
+        return tent_transfer(skin.vertices, vertices, copy.polygons, held, rows, links=skin.links)
+
+    return goal_transfer(source, target, skin_map, factor, _measures(copy))
+
+
+def build_published(source: PreparedFace, target: PreparedFace) -> tuple[BareTransfer, Resampled]:
+    """The paper's transfer, and the target in the source's topology."""
+    skin = source.skin
+    copy = resample(skin, target.skin)
+    places = correspond(copy.vertices, copy.triangles, target.skin, farthest=np.inf, least_facing=-1.0)
+    skin_map = carrying_map(target.skin, places)
+    # Moving the target onto the source is the same as moving the source onto the target.
+    turn = copy.alignment.rotation.T / copy.alignment.scale
+    vertices = _placed(copy, skin)
+
+    def factor(reach: Floats) -> ShapeTransfer:
+        held = _anchors(skin, copy, reach)
+        return tent_transfer(skin.vertices @ turn.T, vertices, copy.polygons, held, links=skin.links, uniform=True)
+
+    measures = {**map_measures(skin_map), **_measures(copy)}
+    return BareTransfer(source, target, skin_map, factor, measures, {"image_columns": AROUND}, turn), copy
+
+
+@dataclass(frozen=True, eq=False)
+class Transferred:
+    """A published result in the paper's form.
+
+    Attributes
+    ----------
+    neutral : (m, 3) the target resampled, mesh units.
+    posed : (m, K, 3) its expressions.
+    polygons : (indices, offsets) of the source, corrected.
+    kept : (n,) bool, vertices of the source's skin that are left, in order.
+    """
+
+    neutral: Floats
+    posed: Floats
+    polygons: Polygons
+    kept: Bools
+
+
+def transferred(source: PreparedFace, target: PreparedFace, motions: Floats) -> Transferred:
+    """Transfer (n, K, 3) motions of a source's skin, and keep the source's topology, as the paper does."""
+    transfer, copy = build_published(source, target)
+    offsets = transfer.deform(motions)[copy.kept]
+    number = np.cumsum(copy.kept) - 1
+    neutral = copy.vertices[copy.kept]
+    unit = target.fapu.es0
+    polygons = number[copy.polygons[0]].astype(np.int32), copy.polygons[1]
+    return Transferred(neutral * unit, (neutral[:, None] + offsets) * unit, polygons, copy.kept)
+
+
+def _placed(copy: Resampled, skin: Surface) -> Floats:
+    """(n, 3) the copy's vertices, equal on both sides of a seam."""
+    if not len(skin.links):
+        return copy.vertices
+    weights = skin.place_sums @ copy.kept.astype(float)
+    mean = (skin.place_sums @ (copy.vertices * copy.kept[:, None])) / np.maximum(weights, 1.0)[:, None]
+    placed: Floats = mean[skin.places]
+    return placed
+
+
+def _anchors(skin: Surface, copy: Resampled, reach: Floats) -> Floats:
+    """(n,) 1 for vertices that never move, for the quietest of each part where all move, and for redundant ones."""
+    part = _parts(skin, copy.polygons)
+    held: Floats = np.where(reach == 0.0, 1.0, 0.0)
+    quietest = np.lexsort((reach, part))
+    held[quietest[np.unique(part[quietest], return_index=True)[1]]] = 1.0
+    return held
+
+
+def _parts(skin: Surface, polygons: Polygons) -> Ints:
+    """(n,) number of the connected part, seams closed; a redundant vertex is one of its own."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    indices, offsets = polygons
+    first = np.repeat(indices[offsets[:-1]], np.diff(offsets))
+    a, b = np.concatenate([first, skin.links[:, 0]]), np.concatenate([indices, skin.links[:, 1]])
+    n = skin.vertex_count
+    found: Ints = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)[1]
+    return found
+
+
+def _measures(copy: Resampled) -> dict[str, float]:
+    return {"redundant_share": float(1.0 - copy.kept.mean())}
