@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from cloning.openings import between_lids, covered_eyes
 from cloning.surface import Surface, symmetric_graph
 from fba.arrays import Bools, Floats, Ints
 
@@ -35,6 +36,9 @@ REACH = {1: ("8.3", "8.4", 0.75), 3: ("3.7", "3.11", 0.75), 5: ("3.8", "3.12", 0
 SURE = 0.8
 """A vertex is labelled where the nearer side's distance is at most this share of the other's."""
 
+SEAM_BAND = 0.12
+"""Half width of the band (in MW) over which a sealed mouth's skin stretches from the upper to the lower lip."""
+
 SEALED = 0.35
 """The mouth counts as sealed where the way from upper to lower lip is shorter than this share of MW."""
 
@@ -47,19 +51,24 @@ class Labels:
     ----------
     values : (n,) int, 0 = belongs to no lip or lid.
     sealed : first label of each pair whose two sides are grown together (1 mouth, 3 left eye, 5 right eye).
-    seam : (n,) float64, distance along the surface from the line where a sealed mouth was cut; inf elsewhere.
+    closed : likewise of each eye whose lids meet in a crease.
+    between : (n,) bool, skin between two sides that are grown together: it stretches.
     """
 
     values: Ints
     sealed: tuple[int, ...]
-    seam: Floats
+    closed: tuple[int, ...]
+    between: Bools
 
 
 def label(surface: Surface) -> Labels:
     """Label the lips and lids of a skin."""
     values = np.zeros(surface.vertex_count, dtype=np.int32)
-    seam = np.full(surface.vertex_count, np.inf)
-    sealed: list[int] = []
+    covered = covered_eyes(surface)
+    between = np.zeros(surface.vertex_count, dtype=bool)
+    for eye in covered.filled:
+        between |= between_lids(surface, eye)
+    sealed = list(covered.filled)
     for (upper, upper_points), (lower, lower_points) in zip(SIDES[::2], SIDES[1::2], strict=True):
         here = [i for i in upper_points if i in surface.points], [i for i in lower_points if i in surface.points]
         left, right, share = REACH[upper]
@@ -67,19 +76,19 @@ def label(surface: Surface) -> Labels:
             continue
         width = float(np.linalg.norm(surface.positions[left] - surface.positions[right]))
         reach = share * width
-        without = None
+        if upper in sealed:
+            continue
         above, below = (surface.distances(ids, 3.0 * width).min(axis=0) for ids in here)
-        if _grown_together(surface, here[0][0], here[1][0], width):
-            sealed.append(upper)
-            if upper != 1:
-                continue
+        if upper == 1 and _grown_together(surface, here[0][0], here[1][0], width):
+            sealed.insert(0, upper)
             without, seam = _cut(surface, width)
+            between |= seam < SEAM_BAND * width
             above, below = (surface.distances(ids, 3.0 * width, without).min(axis=0) for ids in here)
         near, far = np.minimum(above, below), np.maximum(above, below)
         sure = (near < reach) & (near <= SURE * far)
         values[sure & (above < below)] = upper
         values[sure & (below < above)] = lower
-    return Labels(values, tuple(sealed), seam)
+    return Labels(values, tuple(sealed), covered.closed, between)
 
 
 def _grown_together(surface: Surface, upper: str, lower: str, width: float) -> bool:

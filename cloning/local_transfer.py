@@ -20,7 +20,7 @@ from cloning.normalize import blend, ratios
 from cloning.prepare import PreparedFace
 from cloning.refine import Refinement
 from cloning.shape_solver import POINT_WEIGHT, ShapeTransfer
-from cloning.skin import SkinMap, refined, sealed_band
+from cloning.skin import SkinMap, refined
 from cloning.surface import Surface
 from cloning.template.correspondence import Correspondence, correspond
 from cloning.template.fitting import fit_template
@@ -52,7 +52,7 @@ def template_copy(source: PreparedFace, target: PreparedFace) -> tuple[Floats, S
     for step in refinements:
         surface = step.matrix @ surface
     places = correspond(surface, fine.triangles, target.skin, labels=(fine_labels, labels[1]))
-    return copy, carrying_map(target.skin, places, refinements, sealed_band(target.skin, target.labels))
+    return copy, carrying_map(target.skin, places, refinements, target.labels.between)
 
 
 def carrying_map(

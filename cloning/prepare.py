@@ -158,21 +158,25 @@ def _pivots(scene: FaceScene, points: FeaturePoints, fapu: Fapu, who: str) -> tu
 
 
 def _sealed(labels: Labels, where: str) -> list[Finding]:
-    said = {
-        1: (
-            "sealed-mouth",
-            "the lips are grown together, so the mouth cannot open: the skin between them stretches "
-            "smoothly instead. Cut the mesh along the lip line to let it open",
-        ),
-        3: (
-            "sealed-left-eye",
-            "the left eye's lids are grown together or closed over the eye; a blink moves the skin "
-            "but shows no eyeball",
-        ),
-        5: (
-            "sealed-right-eye",
-            "the right eye's lids are grown together or closed over the eye; a blink moves the "
-            "skin but shows no eyeball",
-        ),
-    }
-    return [Finding("warning", *said[k], where) for k in labels.sealed]
+    sides = {3: "left", 5: "right"}
+    found = []
+    if 1 in labels.sealed:
+        text = (
+            "the lips are grown together, so the mouth cannot open: the skin between them stretches smoothly instead; "
+            "jaw, lip corners and cheeks move as ever. Cut the mesh along the lip line to let it open"
+        )
+        found.append(Finding("warning", "sealed-mouth", text, where))
+    for eye in labels.sealed:
+        if eye in sides:
+            text = (
+                f"the {sides[eye]} eye is filled with skin: a blink draws the upper lid's line down to the lower one, "
+                "and what is between is squeezed; no eyeball turns. Cut an opening and add an eyeball for that"
+            )
+            found.append(Finding("warning", f"sealed-{sides[eye]}-eye", text, where))
+    for eye in labels.closed:
+        text = (
+            f"the {sides[eye]} eye is closed, where MPEG-4's neutral face has it open: its lids rest in every motion, "
+            "brows and cheeks move as ever. Open the eye in the mesh to let it blink"
+        )
+        found.append(Finding("warning", f"closed-{sides[eye]}-eye", text, where))
+    return found

@@ -24,9 +24,6 @@ FARTHEST = 0.10
 LEAST_FACING = 0.25
 """A vertex has no partner where the skins' normals differ by more than about 75 degrees."""
 
-SEAM_BAND = 0.12
-"""Half width of the band (in MW) over which a sealed mouth's skin stretches from the upper to the lower lip."""
-
 COARSER = 1.5
 """A source is refined where its edges are longer than the target's by this factor."""
 
@@ -120,7 +117,7 @@ def map_of_places(
     spacing = np.einsum("nk,nk->n", places.weights, _spacing(fine)[fine.triangles[places.triangles]])
     extra = edge_samples(moved, target.normals_of(moved), target.edges, labels, spacing)
     more = find(extra.points, extra.normals, labels[extra.owners])
-    unmatched = (places.distances > FARTHEST) | (places.facing < LEAST_FACING) | sealed_band(target, target_labels)
+    unmatched = (places.distances > FARTHEST) | (places.facing < LEAST_FACING) | target_labels.between
     matrix = _matrix(places, more, extra.owners, unmatched, fine)
     if len(target.links):
         matrix = (target.seam_mean @ matrix).tocsr()
@@ -128,15 +125,6 @@ def map_of_places(
     edges = np.concatenate([target.edges, target.links])
     fill = HarmonicFill(target.vertices, edges, unmatched)
     return SkinMap(refinements, matrix, scale, fill, unmatched, places.distances)
-
-
-def sealed_band(target: Surface, labels: Labels) -> Bools:
-    """(n,) bool, skin between lips that are grown together: it stretches and has no partner."""
-    if 1 not in labels.sealed:
-        return np.zeros(target.vertex_count, bool)
-    width = float(np.linalg.norm(target.positions["8.3"] - target.positions["8.4"]))
-    band: Bools = labels.seam < SEAM_BAND * width
-    return band
 
 
 def _matrix(places: Places, more: Places, owners: Ints, unmatched: Bools, fine: Surface) -> Any:
