@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from remade import bare
 
+from cloning.contours import contour_anchors
 from cloning.locate import closest_on_triangles
 from cloning.prepare import PreparedFace, prepare
 from cloning.similarity import fit_similarity
@@ -281,3 +282,14 @@ def test_a_face_finds_its_own_warped_copy_from_coarse_to_fine(head: PreparedFace
 def test_a_face_fitted_onto_itself_stays(head: PreparedFace) -> None:
     fitted = fit_template(head.skin, head.skin, labels=(head.labels.values, head.labels.values))
     assert np.abs(fitted.vertices - head.skin.vertices).max() < 1e-9
+
+
+def test_anchors_on_the_lids_do_not_depend_on_how_the_head_is_held(head: PreparedFace) -> None:
+    upright = contour_anchors(head.skin)
+    turn = rotation_matrix((1.0, 0.3, -0.2, 0.6))[:3, :3]
+    tilted = contour_anchors(moved(head.skin, lambda v: v @ turn.T))
+    assert len(upright) == 48
+    assert upright.keys() == tilted.keys()
+    for name, (label, place) in upright.items():
+        assert tilted[name][0] == label
+        assert np.allclose(tilted[name][1], turn @ place, atol=1e-9)
