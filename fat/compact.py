@@ -113,5 +113,5 @@ def _with_borders(mesh: FaceDefMesh, places: Floats, kept: list[int], which: Boo
 def _rounded(mesh: FaceDefMesh, rounding: float) -> FaceDefMesh:
     span = float(np.abs(mesh.interval_borders).max())
     decimals = int(np.ceil(np.log10(0.5 * span / rounding)))
-    slopes = np.round(mesh.displacements.astype(np.float64), decimals)
+    slopes = np.round(mesh.displacements.astype(np.float64), decimals) + 0.0  # no negative zeros
     return replace(mesh, displacements=slopes.astype(np.float32))

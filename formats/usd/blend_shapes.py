@@ -28,6 +28,12 @@ from formats.usd.properties import ints, need, put, put_array, rows, to_single, 
 AGREEMENT = 1e-5
 """Offsets that differ from what the slopes give by less than this share of the largest are rounding."""
 
+ROUNDED_PLACES = 8
+"""Slopes with at most so many decimal places were rounded."""
+
+NORMAL_PLACES = 4
+"""Decimal places of what rounded tables do to normals: a hundredth of a degree."""
+
 
 class MeshTargets:
     """Collects the blend shapes of one mesh and binds them to it."""
@@ -47,7 +53,12 @@ class MeshTargets:
         return tuple(self._tokens)
 
     def add(
-        self, name: str, index: Ints, full: Floats, between: Mapping[str, tuple[float, Floats]] | None = None
+        self,
+        name: str,
+        index: Ints,
+        full: Floats,
+        between: Mapping[str, tuple[float, Floats]] | None = None,
+        normal_places: int | None = None,
     ) -> UsdSkel.BlendShape:
         """Author a blend shape.
 
@@ -57,19 +68,21 @@ class MeshTargets:
         index : (k,) vertices that move.
         full : (k, 3) offsets at weight 1; inside axes, local coordinates of the mesh.
         between : name of an inbetween -> its weight and its offsets.
+        normal_places : round what happens to normals to so many decimal places; None keeps all digits.
         """
         path = self.mesh.GetPath().AppendChild(self._namer.name(name))
         shape = UsdSkel.BlendShape.Define(self.mesh.GetStage(), path)
         shape.CreateOffsetsAttr(self._stage_vectors(full))
         shape.CreatePointIndicesAttr(vt(index))
         if self._normals is not None:
-            shape.CreateNormalOffsetsAttr(self._stage_vectors(self._normals.offsets(index, full)))
+            shape.CreateNormalOffsetsAttr(self._stage_vectors(_cut(self._normals.offsets(index, full), normal_places)))
         for label, (weight, offsets) in (between or {}).items():
             inbetween = shape.CreateInbetween(label)
             inbetween.SetWeight(weight)
             inbetween.SetOffsets(self._stage_vectors(offsets))
             if self._normals is not None:
-                inbetween.SetNormalOffsets(self._stage_vectors(self._normals.offsets(index, offsets)))
+                turned = _cut(self._normals.offsets(index, offsets), normal_places)
+                inbetween.SetNormalOffsets(self._stage_vectors(turned))
         self._tokens.append(self._token_namer.name(name))
         self._paths.append(path)
         return shape
@@ -85,6 +98,14 @@ class MeshTargets:
         binding.CreateBlendShapeTargetsRel().SetTargets(self._paths)
 
 
+def _cut(values: Floats, places: int | None) -> Floats:
+    """Numbers of so many decimal places (None: as they are), without negative zeros."""
+    if places is None:
+        return values
+    rounded: Floats = np.round(values, places) + 0.0
+    return rounded
+
+
 def full_value(borders: Ints) -> int:
     """The FAP value at weight 1: the last positive border, or the size of the first where none is positive."""
     last = int(borders[-1])
@@ -94,17 +115,23 @@ def full_value(borders: Ints) -> int:
 def write_face_def_mesh(
     targets: MeshTargets, table: FaceDefTable, mesh: FaceDefMesh, fapu: Fapu, axes: StageAxes
 ) -> Sdf.Path:
-    """Author one FaceDefMesh as a blend shape; its slopes are kept exactly beside the offsets."""
+    """Author one FaceDefMesh as a blend shape; its slopes are kept exactly beside the offsets.
+
+    Where the slopes were rounded, the offsets are too: their text would be twice as long and say nothing more.
+    """
     full = full_value(mesh.interval_borders)
     places = _inbetween_borders(mesh.interval_borders, full)
     offsets = _accumulated(mesh, [full, *places], fapu.unit(fap(table.fap_id).unit))
     if not np.all(np.isfinite(to_single(offsets))):
         raise FaceDefTablesError(f"{table.name} moves '{mesh.shape}' further than 32-bit numbers can say")
+    digits = _places(mesh, float(np.abs(offsets).max(initial=0.0)), full, fapu.unit(fap(table.fap_id).unit))
+    offsets = _cut(offsets, digits)
     between = {
         f"at_{border}".replace("-", "minus_"): (border / full, values)
         for border, values in zip(places, offsets[1:], strict=True)
     }
-    shape = targets.add(table.name, mesh.coord_index, offsets[0], between)
+    normal_places = None if digits is None else NORMAL_PLACES
+    shape = targets.add(table.name, mesh.coord_index, offsets[0], between, normal_places)
     prim = shape.GetPrim()
     put(prim, "fapID", Sdf.ValueTypeNames.Int, table.fap_id)
     put(prim, "highLevelSelect", Sdf.ValueTypeNames.Int, table.high_level_select)
@@ -112,6 +139,16 @@ def write_face_def_mesh(
     put_array(prim, "intervalBorders", mesh.interval_borders)
     put_array(prim, "slopes", to_single(axes.vectors(mesh.displacements)).reshape(-1, 3))
     return shape.GetPath()
+
+
+def _places(mesh: FaceDefMesh, largest: float, full: int, unit: float) -> int | None:
+    """Decimal places that the offsets of rounded slopes deserve, and that keep AGREEMENT; None for other slopes."""
+    slopes = mesh.displacements
+    for places in range(ROUNDED_PLACES + 1):
+        if np.array_equal(np.round(slopes.astype(np.float64), places).astype(np.float32), slopes):
+            step = min(10.0**-places * abs(full) * unit, AGREEMENT * largest)
+            return -int(np.floor(np.log10(step))) if step > 0.0 else None
+    return None
 
 
 def _inbetween_borders(borders: Ints, full: int) -> list[int]:
