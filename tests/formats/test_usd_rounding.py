@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from test_usd import assert_same_face, small_face
+from faces import assert_same_face, small_face
 
 from fat.evaluate import Player
 from fat.face import AnimatableFace
@@ -32,10 +33,11 @@ def test_offsets_of_rounded_tables_are_short_and_right(tmp_path: Path) -> None:
     found = usd.read(path)
     assert isinstance(found, AnimatableFace)
     assert_same_face(found, face)
-    lines = [line for line in path.read_text().splitlines() if "offsets = [" in line.lower()]
-    assert lines
-    words = [w.strip("() ") for line in lines for w in line.split("[", 1)[1].rstrip("]").split(",")]
-    assert max(len(w.lstrip("-").replace(".", "").lstrip("0")) for w in words) <= 7, "float32 would have up to nine"
+    lines = [line for line in path.read_text().splitlines() if "offsets" in line.lower() and "[(" in line]
+    words = [word for line in lines for point in re.findall(r"\(([-0-9.e, ]+)\)", line) for word in point.split(", ")]
+    assert words
+    digits = [w.partition("e")[0].lstrip("-").replace(".", "").lstrip("0") for w in words]
+    assert max(map(len, digits)) <= 7, "float32 would have up to nine"
     assert "-0" not in words
     pose = Player(face).pose({3: 1080}).local["skin"]
     stored = Player(found).pose({3: 1080}).local["skin"]
