@@ -100,15 +100,16 @@ class Correction:
 
     def _activity(self, motion: Floats, goals: Floats) -> Floats:
         """(n, K) 0 where the skin rests and may not be moved, up to 1 where it moves or a feature point must."""
-        size = np.linalg.norm(motion, axis=2)
+        size = np.sqrt(np.einsum("nkc,nkc->nk", motion, motion))
         largest = np.maximum(size.max(axis=0), np.linalg.norm(goals, axis=2).max(axis=0))
         limit = np.maximum(ACTIVE * largest, 1e-300)
         active = smooth_step(size / limit)
         wanted = smooth_step(np.linalg.norm(goals, axis=2) / limit)
-        for point in range(len(self.ids)):
-            column = self.bumps[:, [point]].tocoo()
-            rows, height = column.coords[0], column.data
-            active[rows] = np.maximum(active[rows], height[:, None] * wanted[point])
+        reached = np.flatnonzero(np.diff(self.bumps.indptr))
+        if len(reached):
+            around = self.bumps.data[:, None] * wanted[self.bumps.indices]
+            highest = np.maximum.reduceat(around, self.bumps.indptr[reached], axis=0)
+            active[reached] = np.maximum(active[reached], highest)
         return active
 
 

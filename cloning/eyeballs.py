@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -47,12 +49,16 @@ class Ball:
     vertices: Ints
     rest: Floats
 
-    def radius(self, local: Floats) -> Floats:
-        """Distance of the ball's surface from its centre in the directions of (..., 3) points."""
+    @cached_property
+    def _ways(self) -> Any:
         from scipy.spatial import cKDTree
 
+        return cKDTree(self.way)
+
+    def radius(self, local: Floats) -> Floats:
+        """Distance of the ball's surface from its centre in the directions of (..., 3) points."""
         length = np.maximum(np.linalg.norm(local, axis=-1, keepdims=True), 1e-12)
-        away, near = cKDTree(self.way).query((local / length).reshape(-1, 3), k=min(4, len(self.way)))
+        away, near = self._ways.query((local / length).reshape(-1, 3), k=min(4, len(self.way)))
         weight = 1.0 / np.maximum(away, 1e-6) ** 2
         found: Floats = (weight * self.radii[near]).sum(axis=1) / weight.sum(axis=1)
         return found.reshape(local.shape[:-1])
@@ -60,6 +66,18 @@ class Ball:
     def clearance(self, local: Floats) -> Floats:
         """(...) distance of points from the ball's surface, in radii; negative inside."""
         cleared: Floats = np.linalg.norm(local, axis=-1) / self.radius(local) - 1.0
+        return cleared
+
+    @cached_property
+    def clear_at_rest(self) -> Floats:
+        """(m,) clearance of the skin at rest."""
+        return self.clearance(self.rest - self.center)
+
+    def clear_in_motion(self, offsets: Floats) -> Floats:
+        """(m, K) clearance of the skin in K motions (m, K, 3); most of it rests in most of them."""
+        cleared = np.repeat(self.clear_at_rest[:, None], offsets.shape[1], axis=1)
+        vertex, motion = np.nonzero(np.any(offsets != 0.0, axis=2))
+        cleared[vertex, motion] = self.clearance(self.rest[vertex] + offsets[vertex, motion] - self.center)
         return cleared
 
 
@@ -102,28 +120,26 @@ class EyeGuard:
             return
         field = np.full((len(source_motion), len(some) + 1), FAR)
         for ball in self.mine:
-            moved = np.concatenate([np.zeros((len(ball.vertices), 1, 3)), source_motion[ball.vertices][:, some]], 1)
-            cleared = ball.clearance(ball.rest[:, None] + moved - ball.center)
+            moving = ball.clear_in_motion(source_motion[np.ix_(ball.vertices, some)])
+            cleared = np.column_stack([ball.clear_at_rest, moving])
             field[ball.vertices] = np.minimum(field[ball.vertices], cleared)
         carried = self.carry(field)
         for ball in self.yours:
             self._push(ball, motion, some, carried[ball.vertices, 0], carried[ball.vertices, 1:])
 
     def _push(self, ball: Ball, motion: Floats, some: Ints, at_rest: Floats, wanted: Floats) -> None:
-        offsets = motion[ball.vertices][:, some]
-        local = ball.rest - ball.center
-        place = local[:, None] + offsets
+        offsets = motion[np.ix_(ball.vertices, some)]
+        vertex, which = np.nonzero(np.any(offsets != 0.0, axis=2) & (ball.rest[:, 2] > ball.center[2])[:, None])
+        moved = offsets[vertex, which]
+        place = ball.rest[vertex] - ball.center + moved
         radius = ball.radius(place)
-        size = np.linalg.norm(offsets, axis=2)
-        wanted = np.minimum(wanted, LAYER)
-        lacking = np.minimum(ball.clearance(local) - np.minimum(at_rest, LAYER), 0.0)[:, None]
-        free = np.clip(size / (SHARE * radius), 0.0, 1.0)
-        needed = radius * (1.0 + wanted + lacking * (1.0 - free))
-        flat = place[:, :, 0] ** 2 + place[:, :, 1] ** 2
+        lacking = np.minimum(ball.clear_at_rest - np.minimum(at_rest, LAYER), 0.0)[vertex]
+        free = np.clip(np.linalg.norm(moved, axis=1) / (SHARE * radius), 0.0, 1.0)
+        needed = radius * (1.0 + np.minimum(wanted[vertex, which], LAYER) + lacking * (1.0 - free))
+        flat = place[:, 0] ** 2 + place[:, 1] ** 2
         front = np.sqrt(np.maximum(needed**2 - flat, 0.0))
-        behind = (flat < needed**2) & (local[:, 2] > 0.0)[:, None] & (place[:, :, 2] > -0.1 * radius) & (size > 0.0)
-        push = np.where(behind, np.maximum(front - place[:, :, 2], 0.0), 0.0)
-        motion[ball.vertices[:, None], some[None, :], 2] += push
+        behind = (flat < needed**2) & (place[:, 2] > -0.1 * radius)
+        motion[ball.vertices[vertex], some[which], 2] += np.where(behind, np.maximum(front - place[:, 2], 0.0), 0.0)
 
 
 def eye_guard(source: PreparedFace, target: PreparedFace, carry: Callable[[Floats], Floats]) -> EyeGuard:

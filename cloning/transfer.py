@@ -153,10 +153,11 @@ class FaceTransfer:
                 done.update(yours.split(mover(done)(offsets)))
         for name, binding in self.bindings.items():
             done[name] = binding.apply(skin)
-        out: list[dict[str, Floats]] = []
-        for k in range(len(motions)):
-            out.append({n: np.ascontiguousarray(v[:, k]) for n, v in done.items() if np.any(v[:, k])})
-        return out
+        moved = {name: np.any(values != 0.0, axis=(0, 2)) for name, values in done.items()}
+        return [
+            {name: np.ascontiguousarray(values[:, k]) for name, values in done.items() if moved[name][k]}
+            for k in range(len(motions))
+        ]
 
     def _wanted(self, moving: Floats) -> Floats:
         """(k, K, 3) offsets that the feature points shall have: the source's, scaled by the FAPUs."""
