@@ -17,6 +17,8 @@ NEAR = 0.06
 ROOT = 0.015
 """How much farther than its nearest vertex a vertex may be to count as attached itself, in eye separations."""
 
+NOTHING: Bools = np.zeros(0, dtype=bool)
+
 
 class Binding:
     """Binds a mesh to the skin below it, piece by piece.
@@ -26,7 +28,13 @@ class Binding:
     """
 
     def __init__(
-        self, vertices: Floats, indices: Ints, offsets: Ints, skin: Surface, resting: Bools | None = None
+        self,
+        vertices: Floats,
+        indices: Ints,
+        offsets: Ints,
+        skin: Surface,
+        resting: Bools = NOTHING,
+        lying: Bools = NOTHING,
     ) -> None:
         """Find the attachment.
 
@@ -34,7 +42,8 @@ class Binding:
         ----------
         vertices : (n, 3) world coordinates, in eye separations.
         indices, offsets : its polygons.
-        resting : (n,) what rests though it may touch the skin; None = nothing.
+        resting : (n,) what rests though it may touch the skin; () = nothing.
+        lying : (n,) what is attached all over, not only where it is nearest; () = nothing.
         """
         from scipy.sparse import coo_array, csr_array
         from scipy.sparse.csgraph import connected_components
@@ -46,9 +55,11 @@ class Binding:
         count, piece = connected_components(graph, directed=False)
         nearest = np.full(count, np.inf)
         np.minimum.at(nearest, piece, distances)
-        if resting is not None:
+        if len(resting):
             nearest[piece[resting]] = np.inf
-        root = (nearest[piece] < NEAR) & (distances <= nearest[piece] + ROOT)
+        root = (nearest[piece] < NEAR) & (
+            distances <= nearest[piece] + (np.where(lying, NEAR, ROOT) if len(lying) else ROOT)
+        )
         rows = np.flatnonzero(root)
         self.matrix: Any = csr_array(
             (weights[rows].ravel(), (np.repeat(rows, 3), skin.triangles[triangles[rows]].ravel())),

@@ -101,7 +101,8 @@ def teeth_mover(source: PreparedFace, target: PreparedFace, mine: Body, yours: B
     ----------
     turning : False carries the translation alone, as Facial Motion Cloning publishes it.
     """
-    center_s, center_t = (_middle(f, b, LOWER_TEETH) for f, b in ((source, mine), (target, yours)))
+    shared = all(i in face.points for i in LOWER_TEETH for face in (source, target))
+    center_s, center_t = (_middle(f, b, LOWER_TEETH if shared else ()) for f, b in ((source, mine), (target, yours)))
     ratio = factors(target.fapu, ["9.11"])[0] / factors(source.fapu, ["9.11"])[0]
 
     def move(offsets: Floats) -> Floats:
@@ -288,10 +289,9 @@ def _to_body(of: Body, other: Body | None, es0: float) -> tuple[Floats, Ints]:
 
 
 def _middle(face: PreparedFace, joined: Body, ids: Sequence[str]) -> Floats:
-    """The middle of these feature points; of the body's bounding box where they are not given."""
-    given = [face.place(i) for i in ids if i in face.points]
-    if len(given) == len(ids):
-        found: Floats = np.mean(given, axis=0)
+    """The middle of these feature points; of the body's bounding box where there are none."""
+    if ids:
+        found: Floats = np.mean([face.place(i) for i in ids], axis=0)
         return found
     middle: Floats = 0.5 * (joined.vertices.min(axis=0) + joined.vertices.max(axis=0))
     return middle

@@ -46,7 +46,7 @@ NAMES: tuple[tuple[Kind, str], ...] = (
     (Kind.LASHES, r"lash|\bcilia"),
     (Kind.BROWS, r"brow"),
     (Kind.BEARD, r"beard|mou?stache|stubble|whisker|goatee"),
-    (Kind.HAIR, r"hair(?!line)|\bwig\b|braid|pony ?tail|\bbangs\b"),
+    (Kind.HAIR, r"(?<!c)hair(?!line)|\bwig\b|braid|pony ?tail|\bbangs\b"),
     (Kind.EYE_TRIM, r"lacrimal|caruncle|\btear|occlusion|eye ?blend|wet ?line|meniscus"),
     (Kind.CLOTHES, r"cloth|outfit|shirt|collar|\bhat\b|helmet|scarf|jacket|footwear|shoe|trouser|skirt|dress"),
 )
@@ -73,6 +73,9 @@ MOTION: Mapping[Kind, str] = {
 
 RESTING = (Kind.HAIR, Kind.GLASSES, Kind.CLOTHES)
 """They may touch moving skin, but do not bend with it: hair hangs before cheeks, glasses stand on nose and ears."""
+
+LYING = (Kind.BROWS, Kind.BEARD)
+"""They lie on the skin all over; lashes are rooted in it with one edge."""
 
 ON_SKIN = 0.08
 """Brows lie at most this far from the skin, in eye separations; lashes are rooted at most so far from it."""
@@ -111,17 +114,19 @@ class Parts:
     ----------
     rows : in scene order.
     resting : shape name -> (n,) which vertices rest although they may touch the skin; shapes of role "other".
+    lying : likewise which lie flat on the skin.
     """
 
     rows: tuple[Part, ...]
     resting: Mapping[str, Bools]
+    lying: Mapping[str, Bools]
 
     def finding(self, where: str) -> Finding:
         """One line about all of them."""
         return Finding("info", "parts", f"parts: {in_words(self.rows)}", where)
 
 
-NO_PARTS = Parts((), {})
+NO_PARTS = Parts((), {}, {})
 
 
 def tell_parts(scene: FaceScene, skin: Surface, es0: float) -> Parts:
@@ -135,6 +140,7 @@ def tell_parts(scene: FaceScene, skin: Surface, es0: float) -> Parts:
     pieces = find_pieces(scene)
     rows: list[Part] = []
     resting: dict[str, Bools] = {}
+    lying: dict[str, Bools] = {}
     for shape in scene.shapes:
         of_vertex, used = pieces.of_vertex[shape.name], shape.mesh.used_vertices
         if not used.any():
@@ -145,9 +151,10 @@ def tell_parts(scene: FaceScene, skin: Surface, es0: float) -> Parts:
             size = [int(n) for n, k in zip(count, kinds, strict=True) if k is kind]
             rows.append(Part(shape.name, kind, len(size), sum(size)))
         if shape.role is Role.OTHER:
-            still = [int(k) for k, kind in zip(numbers, kinds, strict=True) if kind in RESTING]
-            resting[shape.name] = np.isin(of_vertex, still)
-    return Parts(tuple(rows), resting)
+            for found, wanted in ((resting, RESTING), (lying, LYING)):
+                some = [int(k) for k, kind in zip(numbers, kinds, strict=True) if kind in wanted]
+                found[shape.name] = np.isin(of_vertex, some)
+    return Parts(tuple(rows), resting, lying)
 
 
 def named(name: str) -> Kind | None:

@@ -145,9 +145,8 @@ def _roles(scene: FaceScene, points: FeaturePoints, pieces: Pieces) -> list[Role
 
 
 def _may_be(role: Role, name: str) -> bool:
-    """False where the file calls a piece tongue that a point takes for teeth, or the other way round."""
-    tongue, teeth = (re.search(pattern, name) is not None for pattern in (TONGUE_NAMES, TEETH_NAMES))
-    return not (tongue if role is not Role.TONGUE else teeth and not tongue)
+    """False where the file calls tongue what a point takes for teeth."""
+    return role is Role.TONGUE or re.search(TONGUE_NAMES, name) is None
 
 
 def _mark_eye(pupil: Floats, piece: int | None, role: Role, roles: list[Role], pieces: Pieces, main: int) -> None:

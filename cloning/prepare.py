@@ -12,7 +12,7 @@ from cloning.labels import Labels, label
 from cloning.parts import INSIDE, split_parts
 from cloning.surface import Surface, build_surface
 from fba.arrays import Floats
-from fba.errors import LandmarkError
+from fba.errors import LandmarkError, MeshError
 from fba.fapu import FAPU_POINTS, Fapu
 from fba.feature_points import FeaturePoint, FeaturePoints, feature_point_definitions
 from fba.findings import Finding
@@ -68,7 +68,10 @@ def prepare(
     ------
     LandmarkError
         If necessary feature points are missing or contradict each other.
+    MeshError
+        If a vertex is not finite.
     """
+    require_finite(scene)
     points, findings = complete_points(scene, points, who, needed, purpose)
     scene, points, turned = orient(scene, points)
     scene, points, missing = split_parts(scene, points)
@@ -87,6 +90,23 @@ def prepare(
     about = [parts.finding(scene.name)] if who == "target" else []
     found = (*findings, *turned, *about, *missing, *derived, *_sealed(labels, scene.name))
     return PreparedFace(scene, points, fapu, skin, labels, found, parts)
+
+
+def require_finite(scene: FaceScene) -> None:
+    """Refuse a scene with vertices that are nowhere.
+
+    Raises
+    ------
+    MeshError
+        If a coordinate is infinite or not a number.
+    """
+    for shape in scene.shapes:
+        wrong = np.flatnonzero(~np.isfinite(shape.mesh.vertices).all(axis=1))
+        if len(wrong):
+            raise MeshError(
+                f"'{scene.name}': {len(wrong)} vertices of '{shape.name}' have no finite coordinates, the first is "
+                f"vertex {wrong[0]}; repair the mesh in the program that wrote it"
+            )
 
 
 def complete_points(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cloning.backends import Anchored, SkinTransfer
-from cloning.bind import Binding
+from cloning.bind import NOTHING, Binding
 from cloning.bodies import Body, Mover, body, eye_mover, teeth_mover, tongue_mover
 from cloning.closed_eyes import HALF, calm_lids, closed_lids
 from cloning.correct import Correction, correction
@@ -18,7 +18,7 @@ from cloning.prepare import PreparedFace
 from cloning.rims import RimFollower, rim_follower
 from fba.arrays import Floats
 from fba.findings import Finding
-from fba.scene import Role
+from fba.scene import Role, Shape
 
 CHUNK = 24
 """Motions carried in one go; keeps the memory of a fine source below a few hundred MB."""
@@ -188,11 +188,7 @@ def build_face_transfer(
         findings.append(Finding("warning", "doubled-points", text, target.scene.name))
     bindings: dict[str, Binding] = {}
     if not as_published:
-        for shape in target.scene.with_role(Role.OTHER):
-            if shape.mesh.vertex_count and shape.mesh.face_count:
-                vertices = target.scene.world_vertices(shape.name) / target.fapu.es0
-                resting = target.parts.resting.get(shape.name)
-                bindings[shape.name] = Binding(vertices, shape.mesh.indices, shape.mesh.offsets, target.skin, resting)
+        bindings = {s.name: _bound(target, s) for s in target.scene.with_role(Role.OTHER) if s.mesh.face_count}
     return FaceTransfer(
         source,
         target,
@@ -206,6 +202,13 @@ def build_face_transfer(
         None if as_published else closed_lids(target.skin, target.labels.closed),
         tuple(findings),
     )
+
+
+def _bound(target: PreparedFace, shape: Shape) -> Binding:
+    """How a shape rides on the target's skin."""
+    resting, lying = (some.get(shape.name, NOTHING) for some in (target.parts.resting, target.parts.lying))
+    vertices = target.scene.world_vertices(shape.name) / target.fapu.es0
+    return Binding(vertices, shape.mesh.indices, shape.mesh.offsets, target.skin, resting, lying)
 
 
 def _measured(source: PreparedFace, target: PreparedFace) -> tuple[tuple[str, ...], list[str]]:
