@@ -129,9 +129,13 @@ class EyeGuard:
 
     def _push(self, ball: Ball, motion: Floats, some: Ints, at_rest: Floats, wanted: Floats) -> None:
         offsets = motion[np.ix_(ball.vertices, some)]
-        vertex, which = np.nonzero(np.any(offsets != 0.0, axis=2) & (ball.rest[:, 2] > ball.center[2])[:, None])
-        moved = offsets[vertex, which]
-        place = ball.rest[vertex] - ball.center + moved
+        place = (ball.rest - ball.center)[:, None] + offsets
+        # Nothing farther out is pushed: a hundredth more, for places just behind the ball's middle.
+        farthest = (1.01 + LAYER) * float(ball.radii.max())
+        inside = np.einsum("mkc,mkc->mk", place, place) < farthest**2
+        inside &= np.any(offsets != 0.0, axis=2) & (ball.rest[:, 2] > ball.center[2])[:, None]
+        vertex, which = np.nonzero(inside)
+        moved, place = offsets[vertex, which], place[vertex, which]
         radius = ball.radius(place)
         lacking = np.minimum(ball.clear_at_rest - np.minimum(at_rest, LAYER), 0.0)[vertex]
         free = np.clip(np.linalg.norm(moved, axis=1) / (SHARE * radius), 0.0, 1.0)
