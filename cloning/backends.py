@@ -101,3 +101,4 @@ register_backend(Backend("dt", "elastic template and deformation transfer (Xiang
 register_backend(Backend("fmc", "Facial Motion Cloning (Pandzic 2001)", "cloning.fmc"))
 register_backend(Backend("vtc", "elastic template and vertex tents (Song et al.)", "cloning.vtc"))
 register_backend(Backend("vtc-image", "mesh image and vertex tents (Song et al.)", "cloning.vtc_image"))
+register_backend(Backend("ec", "Expression Cloning (Noh and Neumann 2001)", "cloning.ec"))

@@ -196,3 +196,21 @@ def lid_profile(anchors: Mapping[str, tuple[int, Floats]]) -> dict[str, float]:
 
 def _names(contour: Contour) -> list[str]:
     return [f"{a}-{b}/{k}" for a, b in pairwise(contour.points) for k in range(1, contour.anchors + 1)]
+
+
+def line_along(surface: Surface, contour: Contour, a: str, b: str) -> tuple[Ints, Floats]:
+    """Vertices along an edge from one of its feature points to the next.
+
+    Returns
+    -------
+    vertices : (k,), empty where there is no way.
+    shares : (k,) of the way's length, from 0 to 1.
+    """
+    if a not in surface.points or b not in surface.points:
+        return np.zeros(0, np.int32), np.zeros(0)
+    way = _way(*_outer_graph(surface, contour), surface, a, b)
+    if way is None or len(way) < 2:
+        return np.zeros(0, np.int32), np.zeros(0)
+    steps = np.linalg.norm(np.diff(surface.vertices[way], axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    return way, along / max(float(along[-1]), 1e-12)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Floats
+from fba.arrays import Floats, Ints
 
 MOUTH_HALF_ANGLE = 0.5
 """Half of the mouth's constant angular width, radians; the paper fixes that it is constant, not its value."""
@@ -42,3 +42,21 @@ def cylinder(positions: Mapping[str, Floats]) -> Cylinder:
     x = 0.5 * float(left[0] + right[0])
     z = 0.5 * float(left[2] + right[2]) - half / np.tan(MOUTH_HALF_ANGLE)
     return Cylinder(x, float(z), float(np.arctan2(tip[0] - x, tip[2] - z)))
+
+
+def round_the_back(plane: Floats, triangles: Ints) -> tuple[Floats, Ints]:
+    """Triangles that cross the seam at +-pi once at its left and once at its right.
+
+    Returns
+    -------
+    points : (3n, 2), the plane, and the plane one turn to the left and to the right.
+    triangles : (t', 3) into these points; modulo n they are the vertices.
+    """
+    n = len(plane)
+    turn = np.array([2.0 * np.pi, 0.0])
+    points = np.concatenate([plane, plane + turn, plane - turn])
+    across = np.ptp(plane[triangles][:, :, 0], axis=1) > np.pi
+    split = triangles[across]
+    left = split + np.where(plane[split][:, :, 0] < 0.0, n, 0)
+    right = split + np.where(plane[split][:, :, 0] > 0.0, 2 * n, 0)
+    return points, np.concatenate([triangles[~across], left, right])

@@ -17,7 +17,7 @@ import numpy as np
 
 from cloning.align import anchor_ids
 from cloning.antialias import SUPPORT, circle_samples
-from cloning.cylinder import MOUTH_HALF_ANGLE, cylinder
+from cloning.cylinder import MOUTH_HALF_ANGLE, cylinder, round_the_back
 from cloning.interpolate import TriangleMesh2D, interpolate
 from cloning.normalize import factors, nearest
 from cloning.prepare import OPTIONAL, PreparedFace
@@ -134,7 +134,7 @@ def _motion_matrix(mine: Projected, triangles: Ints, plane: Floats, lips: Ints) 
 
     samples = np.concatenate([plane[:, None], circle_samples(plane)], axis=1)
     count, n = samples.shape[1], len(mine.plane)
-    points, tiles = _round_the_back(mine.plane, triangles)
+    points, tiles = round_the_back(mine.plane, triangles)
     depth = np.tile(mine.depth, 3)
     rows, columns, entries = [], [], []
     outside = 0
@@ -154,21 +154,3 @@ def _motion_matrix(mine: Projected, triangles: Ints, plane: Floats, lips: Ints) 
         shape=(len(plane), n),
     )
     return matrix, outside / max(samples.shape[0] * count, 1)
-
-
-def _round_the_back(plane: Floats, triangles: Ints) -> tuple[Floats, Ints]:
-    """Triangles that cross the seam at +-pi once at its left and once at its right.
-
-    Returns
-    -------
-    points : (3n, 2), the plane, and the plane one turn to the left and to the right.
-    triangles : (t', 3) into these points; modulo n they are the vertices.
-    """
-    n = len(plane)
-    turn = np.array([2.0 * np.pi, 0.0])
-    points = np.concatenate([plane, plane + turn, plane - turn])
-    across = np.ptp(plane[triangles][:, :, 0], axis=1) > np.pi
-    split = triangles[across]
-    left = split + np.where(plane[split][:, :, 0] < 0.0, n, 0)
-    right = split + np.where(plane[split][:, :, 0] > 0.0, 2 * n, 0)
-    return points, np.concatenate([triangles[~across], left, right])

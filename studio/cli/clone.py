@@ -35,7 +35,7 @@ def clone(
     source_landmarks: Annotated[
         Path | None, typer.Option(help="Feature points of --source where it has none of its own.")
     ] = None,
-    backend: Annotated[str, typer.Option(help="How motion is cloned: fit, dt, vtc, vtc-image or fmc.")] = "fit",
+    backend: Annotated[str, typer.Option(help="How motion is cloned: fit, dt, vtc, vtc-image, fmc or ec.")] = "fit",
     as_published: Annotated[
         bool, typer.Option("--as-published", help="Do literally what the paper says, for comparison.")
     ] = False,
