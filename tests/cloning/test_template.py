@@ -279,11 +279,6 @@ def test_a_face_finds_its_own_warped_copy_from_coarse_to_fine(head: PreparedFace
     assert fitted.residual[fitted.valid].mean() < 2e-4
 
 
-def test_a_face_fitted_onto_itself_stays(head: PreparedFace) -> None:
-    fitted = fit_template(head.skin, head.skin, labels=(head.labels.values, head.labels.values))
-    assert np.abs(fitted.vertices - head.skin.vertices).max() < 1e-9
-
-
 def test_anchors_on_the_lids_do_not_depend_on_how_the_head_is_held(head: PreparedFace) -> None:
     upright = contour_anchors(head.skin)
     turn = rotation_matrix((1.0, 0.3, -0.2, 0.6))[:3, :3]
