@@ -134,12 +134,12 @@ class Player:
     def frames(self, stream: FapStream, batch: int = BATCH_FRAMES) -> Iterator[Pose]:
         """Yield the face at each frame of a stream; FAPs that a frame does not speak of are 0 in it."""
         for start in range(0, len(stream), batch):
-            yield from self._poses(self._values(stream, slice(start, start + batch)))
+            yield from self._poses(self.table_values(stream, slice(start, start + batch)))
 
     def world_frames(self, stream: FapStream, batch: int = BATCH_FRAMES) -> Iterator[Floats]:
         """Yield (b, N, 3) vertices of up to `batch` frames: what `Pose.world` gives, without the detour."""
         for start in range(0, len(stream), batch):
-            values = self._values(stream, slice(start, start + batch))
+            values = self.table_values(stream, slice(start, start + batch))
             out = self._world_deformer(self._plan.weights(values))
             for name, motion in self._chains.motions(values).items():
                 relative = motion.matrices @ self._chains.rest_inverse(name)
@@ -154,8 +154,8 @@ class Player:
             matrices = {n: motions[n].matrices[k] if n in motions else m for n, m in self._chains.rest.items()}
             yield Pose(self.face.scene, {name: vertices[place] for name, place in places.items()}, matrices)
 
-    def _values(self, stream: FapStream, part: slice) -> Floats:
-        """Values (f, tables) of a part of a stream."""
+    def table_values(self, stream: FapStream, part: slice = slice(None)) -> Floats:
+        """Values (f, tables) of the face's tables in a part of a stream, fighting FAPs already combined."""
         select1, select2, blend, _ = (stream.visemes[part] * stream.mask[part, :1]).T
         visemes = ((select1, blend), (select2, BLEND_MAX - blend))
         first, amount1, second, amount2, _, _ = (stream.expressions[part] * stream.mask[part, 1:2]).T

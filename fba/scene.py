@@ -6,10 +6,11 @@ file's own axes were turned, so that writers can give them back exactly.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -154,6 +155,8 @@ class FaceScene:
     meters_per_unit : metres in one unit of length, when the file says so.
     name : for messages: the file's name without folder and extension.
     document : what the file held besides geometry, kept by the reader of that format for its own writer.
+    folder : of the file, where the images lie that materials name; None if it was not read from one.
+    images : the images that were inside the file, by the names that materials give them.
     """
 
     roots: tuple[Node, ...]
@@ -161,6 +164,8 @@ class FaceScene:
     meters_per_unit: float | None = None
     name: str = "face"
     document: object | None = None
+    folder: Path | None = None
+    images: Mapping[str, bytes] = field(default_factory=dict)
 
     def walk(self) -> Iterator[tuple[Node, tuple[Transform, ...]]]:
         """Yield every node, parents first, with its chain of parent transforms (outermost first)."""

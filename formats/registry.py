@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Protocol, cast
@@ -83,11 +83,14 @@ def read(path: str | Path) -> FaceScene | AnimatableFace:
         path = default_source()
     path = Path(path)
     try:
-        return cast("FaceScene | AnimatableFace", _load(format_of(path), "read")(path))
+        found = cast("FaceScene | AnimatableFace", _load(format_of(path), "read")(path))
     except FbaError as error:
         if path.name not in str(error):
             error.args = (f"{path}: {error}", *error.args[1:])
         raise
+    if isinstance(found, AnimatableFace):
+        return replace(found, scene=replace(found.scene, folder=path.parent))
+    return replace(found, folder=path.parent)
 
 
 def read_scene(path: str | Path) -> FaceScene:
