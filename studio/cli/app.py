@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from studio.cli.analogy import analogy
 from studio.cli.author import author
 from studio.cli.check import check
 from studio.cli.clone import clone
@@ -26,7 +27,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for verb in (demo, inspect, landmarks, clone, author, export, play, check, doctor):
+for verb in (demo, inspect, landmarks, clone, author, export, play, check, analogy, doctor):
     app.command()(guarded(verb))
 
 

@@ -1,0 +1,8 @@
+"""Expression analogy in pictures."""
+
+from __future__ import annotations
+
+from cloning.image.analogy import METHODS, Analogy, AnalogyResult, Method, Picture
+from cloning.image.points import Places
+
+__all__ = ["METHODS", "Analogy", "AnalogyResult", "Method", "Picture", "Places"]

@@ -1,0 +1,290 @@
+"""Facial expression analogy in pictures: the source's expression on the target's face (Song et al., section VI)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cloning.image.color import UInt8, is_grey, to_rgb, to_yuv
+from cloning.image.eri import ratio_image
+from cloning.image.grid import differences, motion_rows, tent_equations, tents, wanted_differences
+from cloning.image.mask import face_mask, mouth_opening, slit_mask
+from cloning.image.points import (
+    EYES,
+    MOUTH,
+    Places,
+    eye_separation,
+    face_points,
+    moved_points,
+    refined,
+    source_to_target,
+    to_array,
+)
+from cloning.image.solve import PixelSystem
+from cloning.image.warp import Sampler, WarpMesh, label_pixels, mapped, ring_around, triangulate
+from fba.arrays import Bools, Floats, Ints
+
+Method = Literal["vtc", "eri"]
+METHODS: tuple[Method, ...] = ("vtc", "eri")
+
+RELIEF = 0.05
+"""Height of white over black in the image grid, in eye separations: the scale between luminance and pixels. It does
+not depend on the size of the picture. docs/analogy.md says what it does and how it was chosen."""
+
+SHUT = 0.03
+"""Gap between shut lips, in widths of the mouth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A photograph with its feature points.
+
+    Attributes
+    ----------
+    rgb : (h, w, 3) uint8.
+    points : name -> (x, y), see `cloning.image.points`.
+    """
+
+    rgb: UInt8
+    points: Places
+
+
+@dataclass(frozen=True, eq=False)
+class AnalogyResult:
+    """The target with the source's expression.
+
+    Attributes
+    ----------
+    rgb : (h, w, 3) uint8; where `changed` is False bit-identical to the target.
+    luminance : (h, w) before rounding and clipping.
+    changed : (h, w) True where the warp moved a pixel or the mask let it change.
+    points : where the target's points are now.
+    steps : of the iteration; 0 where the matrix is factored.
+    teeth : True where the source's mouth was shown.
+    """
+
+    rgb: UInt8
+    luminance: Floats
+    changed: Bools
+    points: dict[str, tuple[float, float]]
+    steps: int
+    teeth: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Warp:
+    """Everything geometric about one expression, on the pixels of the box.
+
+    `mask` says how much a pixel follows the source, `skin` is 0 within the eyes, which keep the target's look.
+    """
+
+    mesh: WarpMesh
+    moved: Places
+    labels: Ints
+    mask: Floats
+    skin: Floats
+
+
+class Analogy:
+    """One source and one target, ready for any number of expressions.
+
+    Parameters
+    ----------
+    source, target : neutral faces.
+    expressions : points of all expressions to come: they say how far the target's face will reach.
+    method : vtc, or eri for expression ratio images.
+    teeth : show the source's mouth where it opens and neither neutral face shows teeth.
+
+    Raises
+    ------
+    LandmarkError
+        If points are missing, or a face is too small.
+
+    Examples
+    --------
+    >>> analogy = Analogy(neutral, target, [smiling.points])                              # doctest: +SKIP
+    >>> analogy.apply(smiling).rgb                                                        # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        source: Picture,
+        target: Picture,
+        expressions: Sequence[Places],
+        method: Method = "vtc",
+        teeth: bool = True,
+        relief: float = RELIEF,
+    ) -> None:
+        self.method, self.teeth = method, teeth
+        self._names = face_points(target.points, source.points, *expressions)
+        self._source = {n: source.points[n] for n in self._names}
+        self._target = {n: target.points[n] for n in self._names}
+        self._fine_target = refined(self._target)
+        self._picture = target.rgb
+        self._yuv = to_yuv(target.rgb)
+        self._grey = is_grey(target.rgb)
+        self._unit = eye_separation(target.points)
+        self._height = relief * self._unit / 255.0
+        self._across = source_to_target(self._source, self._target, self._names)
+        self._planes = [Sampler(plane, order) for plane, order in zip(self._yuv, (3, 1, 1), strict=True)]
+        self._neutral = Sampler(to_yuv(source.rgb)[0], shrink=1.0 / self._across.scale)
+        fine = [refined(self._moved(points)) for points in expressions]
+        self._box = self._box_of(fine)
+        self._domain = self._domain_of(fine)
+        self._inside = _bounds(self._domain)
+        self._system: PixelSystem | None = None
+
+    @property
+    def unknowns(self) -> int:
+        """Pixels whose luminance is solved for."""
+        return int(self._domain.sum())
+
+    def apply(self, expression: Picture) -> AnalogyResult:
+        """Give the target the source's expression.
+
+        Parameters
+        ----------
+        expression : a picture of the source, its points among those given before.
+
+        Raises
+        ------
+        LandmarkError
+            If points are missing.
+        """
+        face_points({n: self._target[n] for n in self._names}, expression.points)
+        warp = self._warp(expression.points)
+        own = {n: expression.points[n] for n in self._names}
+        warped, displaced = self._warped_target(warp)
+        pair = self._source_pair(warp, own, expression)
+        steps = 0
+        if self.method == "eri":
+            warped[0] *= 1.0 + warp.mask * (ratio_image(*pair, self._unit) - 1.0)
+        else:
+            change, steps = self._transfer(warped[0], *pair, warp.mask)
+            warped[0] += warp.skin * change
+        shown = self.teeth and self._opens(expression.points, warp.moved)
+        if shown:
+            displaced |= self._show_mouth(warped, warp, own, expression)
+        rows, columns = self._box
+        changed = np.zeros(self._picture.shape[:2], bool)
+        changed[rows, columns] = displaced | (warp.mask > 0)
+        rgb, luminance = self._picture.copy(), self._yuv[0].copy()
+        rgb[rows, columns] = np.where(changed[rows, columns, None], to_rgb(warped), rgb[rows, columns])
+        luminance[rows, columns] = warped[0]
+        return AnalogyResult(rgb, luminance, changed, dict(warp.moved), steps, shown)
+
+    def _moved(self, expression: Places) -> dict[str, tuple[float, float]]:
+        return moved_points(self._source, expression, self._target, self._names)
+
+    def _box_of(self, faces: list[dict[str, tuple[float, float]]]) -> tuple[slice, slice]:
+        """The pixels that some expression may warp."""
+        height, width = self._picture.shape[:2]
+        still = to_array(self._fine_target, list(self._fine_target))
+        rings = [ring_around(np.concatenate([to_array(f, list(f)), still]), (width, height)) for f in faces]
+        low, high = np.min([r.min(axis=0) for r in rings], axis=0), np.max([r.max(axis=0) for r in rings], axis=0)
+        first, last = np.maximum(np.floor(low).astype(int) - 2, 0), np.ceil(high).astype(int) + 3
+        return slice(int(first[1]), min(int(last[1]), height)), slice(int(first[0]), min(int(last[0]), width))
+
+    def _domain_of(self, faces: list[dict[str, tuple[float, float]]]) -> Bools:
+        """The pixels that some mask lets change; the border of the box stays."""
+        domain: Bools = np.any([face_mask(face, self._box) > 0 for face in faces], axis=0)
+        inner = np.zeros_like(domain)
+        inner[2:-2, 2:-2] = domain[2:-2, 2:-2]
+        return inner
+
+    def _warp(self, expression: Places) -> _Warp:
+        moved = refined(self._moved(expression))
+        mesh = triangulate(moved, self._fine_target, self._picture.shape[1::-1])
+        labels = label_pixels(mesh, self._box)
+        mask = np.where(self._domain & (labels >= 0), face_mask(moved, self._box), 0.0)
+        skin = 1.0 - slit_mask(mesh, labels, moved, EYES)
+        return _Warp(mesh, moved, labels, mask * skin, skin)
+
+    def _warped_target(self, warp: _Warp) -> tuple[Floats, Bools]:
+        """Planes of the warped target in the box, and which pixels the warp moved."""
+        rows, columns = np.nonzero(warp.labels >= 0)
+        goals = np.concatenate([to_array(self._fine_target, warp.mesh.names), warp.mesh.ring])
+        places = mapped(warp.mesh.affine(goals), warp.labels, rows, columns, self._box)
+        here = np.stack([columns + self._box[1].start, rows + self._box[0].start])
+        off = np.abs(places - here).max(axis=0) > 1e-6
+        rows, columns, places = rows[off], columns[off], places[:, off]
+        planes = self._yuv[:, self._box[0], self._box[1]].copy()
+        for plane, sampler in zip(planes, self._planes, strict=True):
+            plane[rows, columns] = sampler.at(places)
+        displaced = np.zeros(warp.labels.shape, bool)
+        displaced[rows, columns] = True
+        return planes, displaced
+
+    def _source_pair(self, warp: _Warp, own: Places, expression: Picture) -> tuple[Floats, Floats]:
+        """Luminance of the source's two pictures at the pixels of the warped target; zero where nothing is asked."""
+        rows, columns = np.nonzero((warp.mask > 0) | self._near_domain(warp.labels))
+        pair = np.zeros((2, *warp.labels.shape))
+        shrink = 1.0 / self._expression_scale(own)
+        samplers = (self._neutral, Sampler(to_yuv(expression.rgb)[0], shrink=shrink))
+        for plane, points, sampler in zip(pair, (self._source, own), samplers, strict=True):
+            affine = warp.mesh.affine(self._places(warp, points))
+            plane[rows, columns] = sampler.at(mapped(affine, warp.labels, rows, columns, self._box))
+        return pair[0], pair[1]
+
+    def _near_domain(self, labels: Ints) -> Bools:
+        """The domain and its neighbours, as far as triangles reach."""
+        wide = self._domain.copy()
+        wide[1:] |= self._domain[:-1]
+        wide[:-1] |= self._domain[1:]
+        wide[:, 1:] |= self._domain[:, :-1]
+        wide[:, :-1] |= self._domain[:, 1:]
+        near: Bools = wide & (labels >= 0)
+        return near
+
+    def _expression_scale(self, own: Places) -> float:
+        return source_to_target(own, self._target, self._names).scale
+
+    def _places(self, warp: _Warp, points: Places) -> Floats:
+        """The mesh's corners in a picture of the source; the ring is carried over by the alignment."""
+        back = source_to_target(points, self._target, self._names).inverse()
+        return np.concatenate([to_array(refined(points), warp.mesh.names), back.apply(warp.mesh.ring)])
+
+    def _transfer(self, warped: Floats, neutral: Floats, expression: Floats, mask: Floats) -> tuple[Floats, int]:
+        """The change of luminance by which the target's tents follow the source's."""
+        inside = self._inside
+        warped, neutral, expression = (self._height * plane[inside] for plane in (warped, neutral, expression))
+        share = mask[inside][1:-1, 1:-1]
+        target = tents(warped)
+        motion = share * motion_rows(tents(neutral), tents(expression))
+        motion[2] += 1.0 - share
+        wanted = wanted_differences(target, motion, target.ring + share * differences(expression - neutral))
+        if self._system is None:
+            self._system = PixelSystem(self._domain[inside], tent_equations(target)[0])
+        found, steps = self._system.solve(wanted - target.ring)
+        change = np.zeros(mask.shape)
+        change[inside] = found / self._height
+        return change, steps
+
+    def _opens(self, expression: Places, moved: Places) -> bool:
+        """True where lips part that both neutral faces keep shut."""
+        still = max(mouth_opening(self._source), mouth_opening(self._target))
+        return still < SHUT < min(mouth_opening(expression), mouth_opening(moved))
+
+    def _show_mouth(self, warped: Floats, warp: _Warp, own: Places, expression: Picture) -> Bools:
+        """Put the source's pixels between the lips, and say where."""
+        share = slit_mask(warp.mesh, warp.labels, warp.moved, MOUTH) * (warp.labels >= 0)
+        rows, columns = np.nonzero(share)
+        places = mapped(warp.mesh.affine(self._places(warp, own)), warp.labels, rows, columns, self._box)
+        shrink = 1.0 / self._expression_scale(own)
+        share_here = share[rows, columns]
+        for k, plane in enumerate(to_yuv(expression.rgb)):
+            inside = np.zeros(len(rows)) if k and self._grey else Sampler(plane, 1, shrink).at(places)
+            warped[k, rows, columns] += share_here * (inside - warped[k, rows, columns])
+        return share > 0
+
+
+def _bounds(domain: Bools) -> tuple[slice, slice]:
+    """Rows and columns of a domain, two more on each side."""
+    found = []
+    for axis in (1, 0):
+        at = np.flatnonzero(domain.any(axis=axis))
+        found.append(slice(int(at[0]) - 2, int(at[-1]) + 3))
+    return found[0], found[1]

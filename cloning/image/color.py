@@ -1,0 +1,39 @@
+"""Luminance and chroma: the YUV matrix of ITU-R BT.601, on the stored (gamma coded) values.
+
+Y = 0.299 R + 0.587 G + 0.114 B, U = 0.492 (B - Y), V = 0.877 (R - Y); all in the range of the input, 0..255. The way
+back is the exact inverse of this matrix.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fba.arrays import Floats
+
+UInt8 = NDArray[np.uint8]
+
+LUMA = np.array([0.299, 0.587, 0.114])
+YUV_FROM_RGB = np.stack([LUMA, 0.492 * (np.array([0.0, 0.0, 1.0]) - LUMA), 0.877 * (np.array([1.0, 0.0, 0.0]) - LUMA)])
+RGB_FROM_YUV = np.linalg.inv(YUV_FROM_RGB)
+
+
+def to_yuv(rgb: UInt8 | Floats) -> Floats:
+    """(h, w, 3) colours 0..255 to (3, h, w) planes Y, U, V.
+
+    >>> to_yuv(np.full((1, 1, 3), 200, np.uint8)).round(9).ravel().tolist()
+    [200.0, 0.0, 0.0]
+    """
+    return np.tensordot(YUV_FROM_RGB, np.asarray(rgb, np.float64), axes=(1, 2))
+
+
+def to_rgb(yuv: Floats) -> UInt8:
+    """(3, h, w) planes to (h, w, 3) uint8 colours, rounded; what no screen can show is clipped channel by channel."""
+    rgb = np.moveaxis(np.tensordot(RGB_FROM_YUV, yuv, axes=(1, 0)), 0, 2)
+    out: UInt8 = np.clip(np.rint(rgb), 0, 255).astype(np.uint8)
+    return out
+
+
+def is_grey(rgb: UInt8) -> bool:
+    """True where red, green and blue agree in every pixel."""
+    return bool((rgb[..., 0] == rgb[..., 1]).all() and (rgb[..., 1] == rgb[..., 2]).all())

@@ -1,0 +1,67 @@
+"""Where a picture may change: a feathered mask of the face, and one of what opens in it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cloning.image.points import Places, Slits, eye_separation, rim_names, to_array
+from cloning.image.warp import WarpMesh
+from fba.arrays import Bools, Floats, Ints
+
+INSET = 0.95
+"""The mask's outline lies inside the points of the face's contour, by this factor towards its middle: neither the
+source's background nor its hair is copied onto the face."""
+
+FEATHER = 0.25
+"""Width of the mask's soft border, in eye separations: about the width of an eye's half."""
+
+RIM_FEATHER = 0.02
+"""Softness of the border between lips and mouth, or lids and eye, in eye separations."""
+
+
+def face_mask(moved: Places, box: tuple[slice, slice]) -> Floats:
+    """Values 0..1 for the pixels of a box: 0 outside the face's convex hull, 1 well inside."""
+    from scipy.spatial import ConvexHull
+
+    points = to_array(moved, list(moved))
+    corners = points[ConvexHull(points).vertices]
+    middle = corners.mean(axis=0)
+    corners = middle + INSET * (corners - middle)
+    rows, columns = box
+    y = np.arange(rows.start, rows.stop, dtype=np.float64)[:, None]
+    x = np.arange(columns.start, columns.stop, dtype=np.float64)[None, :]
+    depth = np.full((y.size, x.size), np.inf)
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
+        inside = along[0] * (middle[1] - a[1]) - along[1] * (middle[0] - a[0])
+        depth = np.minimum(depth, np.sign(inside) * (along[0] * (y - a[1]) - along[1] * (x - a[0])))
+    return smooth(depth / (FEATHER * eye_separation(moved)))
+
+
+def slit_mask(mesh: WarpMesh, labels: Ints, moved: Places, slits: Slits) -> Floats:
+    """Values 0..1 for the pixels between these upper and lower rims: between lips, between lids."""
+    from scipy import ndimage
+
+    inside: Bools = np.zeros(labels.shape, bool)
+    for upper, lower in slits:
+        inside |= np.isin(labels, mesh.of_names({*rim_names(upper, moved), *rim_names(lower, moved)}))
+    soft = max(RIM_FEATHER * eye_separation(moved), 0.5)
+    blurred: Floats = ndimage.gaussian_filter(inside.astype(np.float64), soft)
+    return smooth(2.0 * blurred - 0.5)
+
+
+def mouth_opening(places: Places) -> float:
+    """Gap between the lips in widths of the mouth; 0 without points of the inner lips."""
+    if "2.2" not in places or "2.3" not in places:
+        return 0.0
+    gap = np.asarray(places["2.3"]) - np.asarray(places["2.2"])
+    across = np.asarray(places["8.3"]) - np.asarray(places["8.4"])
+    width = float(np.linalg.norm(across))
+    return max(float(across[0] * gap[1] - across[1] * gap[0]) / width**2, 0.0)
+
+
+def smooth(t: Floats) -> Floats:
+    """The smooth step from 0 to 1, flat beyond."""
+    t = np.clip(t, 0.0, 1.0)
+    out: Floats = t * t * (3.0 - 2.0 * t)
+    return out

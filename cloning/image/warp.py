@@ -1,0 +1,154 @@
+"""Piecewise affine warps between pictures, over one triangulation of their feature points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cloning.image.points import EYES, MOUTH, Places, eye_separation, rim_names, to_array
+from fba.arrays import Floats, Ints
+
+Indices = NDArray[np.integer[Any]]
+
+RING = 1.35
+"""How far beyond the face's convex hull, in its own size, the warp ends: neck and hair give way, the rest stays."""
+
+RING_POINTS = 24
+
+APART = 0.03
+"""Rims of lips and lids are held so far apart, in eye separations, while the triangles are chosen: shut lips would
+otherwise be tied to each other by chance."""
+
+
+@dataclass(frozen=True, eq=False)
+class WarpMesh:
+    """Triangles over the moved points of the target.
+
+    Attributes
+    ----------
+    names : of the points; those of the ring come last and have none.
+    places : (n, 2) in the target's warped picture.
+    triangles : (t, 3).
+    ring : (k, 2) the points that stay.
+    """
+
+    names: list[str]
+    places: Floats
+    triangles: Ints
+    ring: Floats
+
+    def of_names(self, names: set[str]) -> Ints:
+        """The triangles with all corners among these points."""
+        has = np.array([n in names for n in self.names] + [False] * len(self.ring))
+        return np.flatnonzero(has[self.triangles].all(axis=1)).astype(np.int32)
+
+    def affine(self, goals: Floats) -> Floats:
+        """(t, 2, 3) maps from the warped picture to the places (n, 2) of the same points in another one."""
+        here, there = self.places[self.triangles], goals[self.triangles]
+        edges, other = here[:, 1:] - here[:, :1], there[:, 1:] - there[:, :1]
+        det = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+        det = np.where(np.abs(det) < 1e-12, np.inf, det)
+        inverse = np.stack([edges[:, 1, 1], -edges[:, 0, 1], -edges[:, 1, 0], edges[:, 0, 0]], axis=1) / det[:, None]
+        linear = np.einsum("tij,tjk->tki", inverse.reshape(-1, 2, 2), other)
+        shift = there[:, 0] - np.einsum("tij,tj->ti", linear, here[:, 0])
+        return np.concatenate([linear, shift[:, :, None]], axis=2)
+
+
+def ring_around(points: Floats, size: tuple[int, int]) -> Floats:
+    """(k, 2) points around a face, within a picture of `size` = (width, height)."""
+    from scipy.spatial import ConvexHull
+
+    corners = points[ConvexHull(points).vertices]
+    middle = corners.mean(axis=0)
+    out = middle + RING * (corners - middle)
+    closed = np.concatenate([out, out[:1]])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    wanted = np.linspace(0.0, along[-1], RING_POINTS, endpoint=False)
+    ring = np.stack([np.interp(wanted, along, closed[:, i]) for i in (0, 1)], axis=1)
+    inside: Floats = np.clip(ring, 0.0, np.array(size, np.float64) - 1.0)
+    return inside
+
+
+def triangulate(moved: Places, target: Places, size: tuple[int, int]) -> WarpMesh:
+    """Triangulate the target's moved points and a ring around both states (Delaunay, lips and lids held apart)."""
+    from scipy.spatial import Delaunay
+
+    names = list(moved)
+    places = to_array(moved, names)
+    ring = ring_around(np.concatenate([places, to_array(target, names)]), size)
+    apart = places.copy()
+    index = {name: i for i, name in enumerate(names)}
+    push = APART * eye_separation(target) / 2.0
+    for slit in MOUTH + EYES:
+        for rim, sign in zip(slit, (-1.0, 1.0), strict=True):
+            rows = [index[n] for n in rim_names(rim, moved)]
+            apart[rows, 1] += sign * push * np.sin(np.linspace(0.0, np.pi, len(rows)))
+    triangles = Delaunay(np.concatenate([apart, ring])).simplices.astype(np.int32)
+    return WarpMesh(names, np.concatenate([places, ring]), triangles, ring)
+
+
+def label_pixels(mesh: WarpMesh, box: tuple[slice, slice]) -> Ints:
+    """Which triangle covers each pixel of a box (rows, columns), -1 for none."""
+    rows, columns = box
+    labels = np.full((rows.stop - rows.start, columns.stop - columns.start), -1, np.int32)
+    corner = np.array([columns.start, rows.start], np.float64)
+    for number, three in enumerate(mesh.places[mesh.triangles] - corner):
+        low = np.maximum(np.ceil(three.min(axis=0) - 1e-9).astype(int), 0)
+        high = np.minimum(np.floor(three.max(axis=0) + 1e-9).astype(int) + 1, labels.shape[::-1])
+        if (high <= low).any():
+            continue
+        (ax, ay), (bx, by), (cx, cy) = three
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if abs(area) < 1e-12:
+            continue
+        x = np.arange(low[0], high[0], dtype=np.float64)[None, :]
+        y = np.arange(low[1], high[1], dtype=np.float64)[:, None]
+        second = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / area
+        third = ((y - ay) * (bx - ax) - (x - ax) * (by - ay)) / area
+        inside = (second >= -1e-9) & (third >= -1e-9) & (second + third <= 1.0 + 1e-9)
+        labels[low[1] : high[1], low[0] : high[0]][inside] = number
+    return labels
+
+
+def mapped(affine: Floats, labels: Ints, rows: Indices, columns: Indices, box: tuple[slice, slice]) -> Floats:
+    """(2, p) places (x, y) in another picture for pixels of a box, all of them in some triangle."""
+    a = affine[labels[rows, columns]]
+    x, y = (columns + box[1].start).astype(np.float64), (rows + box[0].start).astype(np.float64)
+    return np.stack([a[:, i, 0] * x + a[:, i, 1] * y + a[:, i, 2] for i in (0, 1)])
+
+
+class Sampler:
+    """A plane of a picture that can be read between its pixels.
+
+    Parameters
+    ----------
+    plane : (h, w).
+    order : 3 = cubic spline, 1 = linear.
+    shrink : how many of its pixels will become one; more than 1 blurs it first, so that it does not alias.
+    """
+
+    def __init__(self, plane: Floats, order: int = 3, shrink: float = 1.0) -> None:
+        from scipy import ndimage
+
+        plane = np.asarray(plane, np.float64)
+        if shrink > 1.0:
+            plane = ndimage.gaussian_filter(plane, 0.5 * np.sqrt(shrink**2 - 1.0), mode="nearest")
+        self._order = order
+        self._plane = plane
+        if order > 1:
+            self._plane = np.empty_like(plane)
+            filters: Any = ndimage
+            filters.spline_filter(plane, order, output=self._plane, mode="nearest")
+
+    def at(self, places: Floats) -> Floats:
+        """Values at (2, p) places (x, y); beyond the border its value counts."""
+        from scipy import ndimage
+
+        filters: Any = ndimage
+        found: Floats = filters.map_coordinates(
+            self._plane, places[::-1], order=self._order, mode="nearest", prefilter=False
+        )
+        return found
