@@ -27,7 +27,8 @@ from PIL import Image
 from benchmarks.fidelity import back_of_head, targets
 from benchmarks.landmarks import SHARED, errors
 from cloning import CloneReport, clone_with_report
-from cloning.pieces import count_pieces
+from cloning.backends import DEFAULT_BACKEND
+from cloning.pieces import count_pieces, find_pieces
 from cloning.prepare import prepare
 from fat.build import face_motions
 from fat.evaluate import Player
@@ -35,7 +36,8 @@ from fat.face import AnimatableFace
 from fat.quality import LIP_PAIRS, feature_point_motion, lip_gap_change, opening_change
 from fba.errors import FbaError
 from fba.feature_points import FeaturePoint, FeaturePoints
-from fba.scene import FaceScene
+from fba.mesh import PolyMesh
+from fba.scene import FaceScene, Role
 from formats import read, read_face, read_scene, write
 from formats.landmarks import read_landmarks
 from samples import sample
@@ -53,6 +55,8 @@ POINTS = ROOT / "tests" / "data"
 SHIPPED = ("tri_head", "quad_head", "closed_head")
 OTHER_FILES = ("candide3/candide3.wfm", "rpm-brunette/brunette-t.glb", "greta/greta_face.mesh")
 """Files of the folder that are not OBJ."""
+HELPERS = r"\b(joint|helper)\b(?!.*lash)"
+"""Pieces of MakeHuman's base mesh that are moulds for clothes and marks of joints: cloned, but not drawn."""
 NOT_NEUTRAL = ("eyeBlink_L", "jawOpen", "mouthSmile_L")
 """Other poses of a face of the folder."""
 
@@ -66,7 +70,8 @@ POSES = (
     PosePick("brows", {31: 120, 32: 120, 33: 140, 34: 140, 35: 100, 36: 100}),
 )
 WIDTH = 200
-COLORS = 96
+DOT = 2
+COLORS = 200
 """Of a written picture: few enough for a small file."""
 
 IN_CONTACT = 0.01
@@ -76,12 +81,16 @@ EARS = (65, 66, 67, 68)
 
 @dataclass(frozen=True)
 class Case:
-    """A face file, where its feature points truly are (file axes), and points given to the detector."""
+    """A face file, where its feature points truly are (file axes), and points given to the detector.
+
+    hidden : names of pieces that are not drawn, see `cloning.pieces.words`.
+    """
 
     name: str
     path: Path
     truth: FeaturePoints | None = None
     given: Path | None = None
+    hidden: str = "(?!)"
 
 
 @dataclass(frozen=True)
@@ -109,7 +118,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--faces", type=Path, default=SHARED)
     parser.add_argument("--only", default="", help="names of faces, by commas")
-    parser.add_argument("--backend", default="fit")
+    parser.add_argument("--backend", default=DEFAULT_BACKEND)
     parser.add_argument("--sheets", type=Path)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--write", action="store_true")
@@ -152,7 +161,7 @@ def _all(folder: Path, scratch: Path, names: Sequence[str]) -> Iterator[Case]:
             if known_points is not None:
                 scene = read_scene(path)
                 truth = _free(scene, read_landmarks(folder / "landmarks" / known_points, scene))
-            yield Case(path.parent.name, path, truth)
+            yield Case(path.parent.name, path, truth, hidden=HELPERS if path.parent.name == "makehuman" else "(?!)")
     for name in OTHER_FILES:
         yield Case(Path(name).name, folder / "faces" / name)
     phenotypes = ("phenotype_a_dec", "phenotype_b_dec")
@@ -187,7 +196,7 @@ def run(case: Case, backend: str, sheets: Path | None) -> Row:
     row = _measured(row, case, scene, source, face, report)
     if sheets is not None:
         sheets.mkdir(parents=True, exist_ok=True)
-        picture = sheet(face, case.name).quantize(COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+        picture = sheet(face, case).quantize(COLORS, dither=Image.Dither.NONE)
         save_png(picture, sheets / f"{re.sub(r'[^a-z0-9]+', '_', case.name.lower()).strip('_')}.png")
     return row
 
@@ -212,7 +221,8 @@ def _measured(
     points = None
     if case.truth is not None:
         inside = face.feature_points.positions(face.scene)
-        back = {key: FeaturePoint.free(face.scene.frame.to_file(place)) for key, place in inside.items()}
+        detected = [key for key, p in face.feature_points.items() if p.source == "detected"]
+        back = {key: FeaturePoint.free(face.scene.frame.to_file(inside[key])) for key in detected}
         off = errors(scene, FeaturePoints(back), case.truth, ())
         points = float(np.mean(list(off.values()))), max(off.values())
     return replace(
@@ -250,9 +260,10 @@ def drift(face: AnimatableFace) -> float:
     return max((back_of_head(prepared, prepared.skin.join(m) / face.fapu.es0) for m in motions), default=0.0)
 
 
-def sheet(face: AnimatableFace, title: str) -> Image.Image:
+def sheet(face: AnimatableFace, case: Case) -> Image.Image:
     """Poses side by side; the neutral one with the feature points that face the viewer."""
-    player, figure, renderer = Player(face), Figure.of_face(face), make_renderer()
+    player, renderer = Player(face), make_renderer()
+    figure = Figure(_without(face.scene, case.hidden), face.feature_points)
     held = {table.key for table in face.tables}
     poses = [pose for pose in POSES if pose.tables() <= held]
     pictures = []
@@ -260,11 +271,25 @@ def sheet(face: AnimatableFace, title: str) -> Image.Image:
         shapes = player.pose(pose.faps, pose.viseme, pose.expression).world_shapes()
         pictures.append(figure.draw(shapes, (WIDTH, round(1.2 * WIDTH)), renderer=renderer))
     places = face.feature_points.positions(face.scene)
-    shown = [key for key in places if not key.startswith(("7.", "10."))]
-    pictures[0] = marked(pictures[0], face.feature_points, places, shown, figure.camera, figure, 1, False)
-    made = Sheet(title)
+    shown = [key for key in places if not key.startswith(("6.", "7.", "9.8", "9.9", "9.10", "9.11", "10."))]
+    pictures[0] = marked(pictures[0], face.feature_points, places, shown, figure.camera, figure, DOT, False)
+    made = Sheet(case.name)
     made.add_row("", pictures, [pose.caption for pose in poses])
     return made.image()
+
+
+def _without(scene: FaceScene, hidden: str) -> FaceScene:
+    """The scene without the polygons of pieces of these names; all vertices stay."""
+    pieces = find_pieces(scene)
+    gone = np.array([re.search(hidden, name) is not None for name in pieces.names])
+    change = {}
+    for shape in scene.with_role(Role.OTHER):
+        mesh = shape.mesh
+        kept = np.flatnonzero(~gone[pieces.of_vertex[shape.name][mesh.indices[mesh.offsets[:-1]]]])
+        if len(kept) < mesh.face_count:
+            faces = [mesh.face(int(f)) for f in kept]
+            change[shape.name] = replace(shape, mesh=PolyMesh.from_faces(mesh.vertices, faces), materials=())
+    return scene.map_shapes(change)
 
 
 HEADING = (

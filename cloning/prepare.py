@@ -28,6 +28,9 @@ DERIVED = ("3.5", "3.6", "7.1", "7.2")
 OPTIONAL = ("7.1", "7.2", "11.4", "11.5", "11.6", "8.9", "8.10", *(f"9.{k}" for k in (4, 5, 6, 7, 12, 13, 14)))
 """Not among the points that Facial Motion Cloning asks for; they refine the alignment where they are given."""
 
+FIGURE = 8.0
+"""What reaches farther than this below the chin, in eye separations, is more than a bust: half a metre of a man."""
+
 
 @dataclass(frozen=True, eq=False)
 class PreparedFace:
@@ -87,7 +90,7 @@ def prepare(
         )
     labels = label(skin)
     parts = tell_parts(scene, skin, fapu.es0)
-    about = [parts.finding(scene.name)] if who == "target" else []
+    about = [parts.finding(scene.name), *_whole_figure(scene, skin, fapu.es0)] if who == "target" else []
     found = (*findings, *turned, *about, *missing, *derived, *_sealed(labels, scene.name))
     return PreparedFace(scene, points, fapu, skin, labels, found, parts)
 
@@ -175,6 +178,18 @@ def _pivots(scene: FaceScene, points: FeaturePoints, fapu: Fapu, who: str) -> tu
             place["7.1"] + np.array([0.0, -1.5, -0.2]) * fapu.es0, source="derived", confidence=0.3
         )
     return points.with_points(added), findings
+
+
+def _whole_figure(scene: FaceScene, skin: Surface, es0: float) -> list[Finding]:
+    """Say that there is more than a head."""
+    lowest = min(float(scene.world_vertices(s.name)[:, 1].min()) for s in scene.shapes if s.mesh.vertex_count)
+    if float(skin.positions["2.1"][1]) - lowest / es0 < FIGURE:
+        return []
+    text = (
+        "the file holds a whole figure: only the face gets motion of its own, and the head's rotations, FAPs 48 to 50, "
+        "turn everything; give the head alone where the body has a rig of its own"
+    )
+    return [Finding("warning", "whole-figure", text, scene.name)]
 
 
 def _sealed(labels: Labels, where: str) -> list[Finding]:
