@@ -69,15 +69,18 @@ def check_points(scene: FaceScene, points: FeaturePoints) -> list[Finding]:
             f"left and right are exchanged for the feature points {', '.join(swapped)}: left means the subject's "
             "left, which is +X here; exchange each pair"
         )
-    for axis, rows, words in ((1, _ABOVE, "above"), (0, _MORE_LEFT, "to the left of")):
-        wrong = [
-            f"{a} must lie {words} {b}"
-            for a, b in rows
-            if a in at and b in at and at[a][axis] - at[b][axis] < -_TOLERANCE * size
-        ]
+    for axis, words in ((1, "above"), (0, "to the left of")):
+        wrong = [f"{a} must lie {words} {b}" for a, b in contradictions(at, axis)]
         if wrong:
             raise LandmarkError(f"feature points contradict each other: {'; '.join(wrong)}; check these points")
     return _midline(at, both)
+
+
+def contradictions(at: Mapping[str, Floats], axis: int) -> list[tuple[str, str]]:
+    """Pairs of points of which the first must lie above (axis 1) or more to the left (axis 0), but does not."""
+    size = _size(at, pairs(at))
+    rows = _ABOVE if axis else _MORE_LEFT
+    return [(a, b) for a, b in rows if a in at and b in at and float(at[a][axis] - at[b][axis]) < -_TOLERANCE * size]
 
 
 def _size(at: Mapping[str, Floats], both: list[tuple[str, str]]) -> float:
