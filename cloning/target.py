@@ -1,11 +1,11 @@
-"""A target as it is given: its scene, and its feature points, detected where none are given."""
+"""A target as it is given: its scene, and its feature points, detected where none or too few are given."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from cloning.detect.detect import detect_points
-from cloning.prepare import PreparedFace, prepare
+from cloning.prepare import DERIVED, NECESSARY, PreparedFace, prepare, require_finite
 from fat.face import AnimatableFace
 from fat.rig import unrig
 from fba.feature_points import FeaturePoints
@@ -18,16 +18,21 @@ def target_points(
 ) -> tuple[FaceScene, FeaturePoints, tuple[Finding, ...]]:
     """The target without transforms of its own, its feature points, and what is uncertain about them.
 
+    Where some of the points that cloning needs are not given, they are detected, and those given hold the others.
+
     Raises
     ------
     LandmarkError
         If there are no points and no face is found.
+    MeshError
+        If a vertex is not finite.
     """
     if isinstance(onto, AnimatableFace):
         return unrig(onto), onto.feature_points if landmarks is None else landmarks, ()
-    if landmarks is not None:
+    if landmarks is not None and all(key in landmarks or key in DERIVED for key in NECESSARY):
         return onto, landmarks, ()
-    found = detect_points(onto, source)
+    require_finite(onto)
+    found = detect_points(onto, source, landmarks)
     return onto, found.points, found.findings
 
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from cloning.detect.confidence import confidences, describe
-from cloning.detect.head import SAMPLES, Head, facing, find_pose, isolate, settle
+from cloning.detect.head import FACE_SCORE, SAMPLES, Head, facing, find_pose, isolate, settle
 from cloning.detect.inside import inner_points
 from cloning.detect.model import FaceTemplate, Source, ready
 from cloning.detect.neighbours import by_neighbours
+from cloning.detect.register import agreement
 from cloning.detect.rules import OPEN, by_rule
 from cloning.detect.samples import sample
 from cloning.detect.search import Pose
@@ -26,14 +28,10 @@ from fba.arrays import Floats, Ints
 from fba.errors import LandmarkError
 from fba.feature_points import FeaturePoint, FeaturePoints, feature_point_definitions
 from fba.findings import Finding
-from fba.landmark_checks import pairs
+from fba.landmark_checks import contradictions, pairs
 from fba.scene import FaceScene
 
-DETECTORS = ("auto", "xiang")
-
-FACE_SCORE = 0.74
-"""Agreement with the source's face below which a file holds no face; measured: human heads, busts, masks and bodies
-0.78 to 0.98, the best places in creatures 0.54 to 0.70."""
+DETECTORS = ("auto", "xiang", "xiang-once")
 
 ENOUGH = 4
 """With so many given points the head's place is taken from them."""
@@ -92,7 +90,8 @@ def detect_points(
     scene : any file with a head in it: any axes, unit and place.
     source : a face whose feature points are known.
     given : points that are right already; they are kept, and the others are fitted to them.
-    detector : "auto", or "xiang" for the 20 landmarks of Xiang et al. (2008) as published.
+    detector : "auto"; or "xiang" for the 20 landmarks of Xiang et al. (2008) as published; "xiang-once" leaves out
+        their second detection on the deformed source.
 
     Raises
     ------
@@ -108,7 +107,7 @@ def detect_points(
     surface, unit = _whole(scene)
     clicked = {} if given is None else {key: p / unit for key, p in given.positions(scene).items()}
     head = _head(surface, model, clicked, scene.name)
-    known = {key: head.pose.apply(p[None])[0] for key, p in clicked.items()}
+    known = {key: head.pose.apply(p[None])[0] for key, p in clicked.items() if key in skin.points}
     tell("fitting the face", 0.4)
     places, ruled, residual = _DETECT[detector](head, model, known)
     tell("placing the points", 0.9)
@@ -131,6 +130,9 @@ def _head(surface: Surface, source: Source, clicked: Mapping[str, Floats], name:
         if len(view.points) < 100:
             raise LandmarkError(f"'{name}': there is no surface where the given points say that the face is")
         pose = settle(points, model, start)
+        if pose.score < FACE_SCORE:
+            # The shape is no human face's, so it must not overrule the points.
+            pose = replace(start, score=float(agreement(model.face, view, start).mean()))
     else:
         pose, inside_out = find_pose(surface, model)
         if pose.score < FACE_SCORE:
@@ -142,38 +144,63 @@ def _head(surface: Surface, source: Source, clicked: Mapping[str, Floats], name:
     return isolate(surface, pose, inside_out, model)
 
 
-def _auto(
-    head: Head, source: Source, known: Mapping[str, Floats]
-) -> tuple[dict[str, Floats], dict[str, float], dict[str, float]]:
+_Found = tuple[dict[str, Floats], dict[str, float], dict[str, float]]
+"""Places; how far rule and guess differ where there is a rule; how far the fitted source is from the skin."""
+
+
+def _auto(head: Head, source: Source, known: Mapping[str, Floats]) -> _Found:
     """Fit the face without landmarks, then rules, then fit the head to what the rules have found."""
     skin = source.skin
-    guess, _ = _fitted(head, source.face, known, FIRST)
-    guess = _evened({**guess, **known}, known, _start(head, skin))
+    guess, _ = _fitted(head, source.face, known, known, FIRST)
+    guess = _evened({**guess, **known}, known, _start(head, skin, known))
     ruled = {k: p + source.offsets[k] for k, p in by_rule(head.skin, guess).items() if k in source.offsets}
     ruled = {k: p for k, p in ruled.items() if _both_sides(k, ruled) and k not in known}
-    places, residual = _fitted(head, source.head, {**ruled, **known}, FIT)
+    places, residual = _fitted(head, source.head, {**ruled, **known}, known, FIT)
     differ = {key: float(np.linalg.norm(place - guess[key])) for key, place in ruled.items()}
     places = _evened({**places, **ruled, **known}, known, guess)
     places |= {k: p for k, p in by_neighbours(head.skin, skin, places).items() if k not in known}
-    parted = _parted(places, known, _start(head, skin))
+    parted = _parted(places, known, _start(head, skin, known))
     return {**places, **parted}, differ, {**residual, **dict.fromkeys(parted, LIMITS)}
 
 
 def _parted(
     places: Mapping[str, Floats], known: Mapping[str, Floats], start: Mapping[str, Floats]
 ) -> dict[str, Floats]:
-    """The lids of eyes that were found closed or the wrong way round, where the source's proportions have them."""
+    """Points that cannot be right, where the source's proportions have them: lids that were found closed or the wrong
+    way round, points above those that belong above them."""
     found = {}
-    for upper, lower in LIDS:
-        if float(places[upper][1] - places[lower][1]) < OPEN:
-            found.update({key: start[key] for key in (upper, lower) if key not in known})
+    wrong = [pair for pair in LIDS if float(places[pair[0]][1] - places[pair[1]][1]) < OPEN]
+    for pair in (*wrong, *contradictions(places, 0), *contradictions(places, 1)):
+        found.update({key: start[key] for key in pair if key not in known})
     return found
 
 
-def _start(head: Head, skin: Surface) -> dict[str, Floats]:
+def _start(head: Head, skin: Surface, known: Mapping[str, Floats]) -> dict[str, Floats]:
     """The source's feature points in the head's proportions."""
+    places = _brought(head, skin, np.array(list(skin.positions.values())), known)
+    return dict(zip(skin.positions, places, strict=True))
+
+
+def _brought(head: Head, source: Surface, places: Floats, known: Mapping[str, Floats]) -> Floats:
+    """Places of the source's in the head's proportions, and to where the known points say.
+
+    Parameters
+    ----------
+    source : the source's skin, or a part of it.
+    places : (n, 3).
+    """
+    from scipy.interpolate import RBFInterpolator
+
     factors, shift = head.proportions
-    return {key: place * factors + shift for key, place in skin.positions.items()}
+    ids = [key for key in known if key in source.positions]
+    moved: Floats = places * factors + shift
+    if len(ids) < ENOUGH:
+        return moved
+    anchors = np.array([source.positions[key] for key in ids])
+    missing = np.array([known[key] for key in ids]) - (anchors * factors + shift)
+    # No more than each point's own way is known: far from all of them it is the mean that counts.
+    more: Floats = RBFInterpolator(anchors, missing, kernel="linear", degree=0)(places)
+    return moved + more
 
 
 def _both_sides(key: str, ruled: Mapping[str, Floats]) -> bool:
@@ -208,20 +235,22 @@ def _evened(places: Mapping[str, Floats], known: Mapping[str, Floats], near: Map
     return found
 
 
-def _xiang(
-    head: Head, source: Source, known: Mapping[str, Floats]
-) -> tuple[dict[str, Floats], dict[str, float], dict[str, float]]:
+def _xiang(head: Head, source: Source, known: Mapping[str, Floats], again: bool = True) -> _Found:
     """The published landmarks, the elastic fit to them, and both once more."""
-    template = source.head
-    surface = template.surface
-    marks = detect_landmarks(surface, _stretched(head, surface), head.skin)
-    deformed = _deformed(head, template, {**marks, **known}, FIT)
-    marks = detect_landmarks(surface, deformed, head.skin)
-    places, residual = _fitted(head, template, {**marks, **known}, FIT)
+    surface = source.head.surface
+    marks = detect_landmarks(surface, _brought(head, surface, surface.vertices, known), head.skin)
+    if again:
+        deformed = _deformed(head, source.head, {**marks, **known}, known, FIT)
+        marks = detect_landmarks(surface, deformed, head.skin)
+    places, residual = _fitted(head, source.head, {**marks, **known}, known, FIT)
     return {**places, **marks, **known}, {}, residual
 
 
-_DETECT = {"auto": _auto, "xiang": _xiang}
+_DETECT: Mapping[str, Callable[[Head, Source, Mapping[str, Floats]], _Found]] = {
+    "auto": _auto,
+    "xiang": _xiang,
+    "xiang-once": partial(_xiang, again=False),
+}
 
 
 def _whole(scene: FaceScene) -> tuple[Surface, float]:
@@ -236,29 +265,32 @@ def _whole(scene: FaceScene) -> tuple[Surface, float]:
     return build_surface(scene, FeaturePoints({}), names, unit), unit
 
 
-def _deformed(head: Head, template: FaceTemplate, marks: Mapping[str, Floats], schedule: Schedule) -> Floats:
+def _deformed(
+    head: Head,
+    template: FaceTemplate,
+    marks: Mapping[str, Floats],
+    known: Mapping[str, Floats],
+    schedule: Schedule,
+) -> Floats:
     """The template's vertices on the head."""
     surface = template.surface
     target = replace(head.skin, positions=dict(marks))
     ids = [key for key in marks if key in surface.points]
-    start = _stretched(head, surface)
+    start = _brought(head, surface, surface.vertices, known)
     k_c = schedule.k_c[0] / template.share, schedule.k_c[1] / template.share
     rules = replace(schedule, k_c=k_c)
     return fit_template(surface, target, ids, schedule=rules, visible=template.pulled, start=start).vertices
 
 
-def _stretched(head: Head, template: Surface) -> Floats:
-    """The template's vertices in the head's proportions."""
-    factors, shift = head.proportions
-    stretched: Floats = template.vertices * factors + shift
-    return stretched
-
-
 def _fitted(
-    head: Head, template: FaceTemplate, marks: Mapping[str, Floats], schedule: Schedule
+    head: Head,
+    template: FaceTemplate,
+    marks: Mapping[str, Floats],
+    known: Mapping[str, Floats],
+    schedule: Schedule,
 ) -> tuple[dict[str, Floats], dict[str, float]]:
     """Every feature point through the fitted template, and how far from the skin the template was there."""
-    vertices = _deformed(head, template, marks, schedule)
+    vertices = _deformed(head, template, marks, known, schedule)
     surface = template.surface
     ids = list(surface.points)
     rows = surface.point_matrix(ids)
@@ -267,7 +299,11 @@ def _fitted(
     search = TriangleSearch(head.skin.vertices, head.skin.triangles)
     found = search.closest(places, normals, None, 0.3, LIMITS)
     # Where the target has nothing (the lower jaw of a mask) the source's proportions are the best guess.
-    on = np.where((found.triangles >= 0)[:, None], search.positions(found), rows @ _stretched(head, surface))
+    on = np.where(
+        (found.triangles >= 0)[:, None],
+        search.positions(found),
+        _brought(head, surface, rows @ surface.vertices, known),
+    )
     return dict(zip(ids, on, strict=True)), dict(zip(ids, np.minimum(found.distances, LIMITS).tolist(), strict=True))
 
 

@@ -7,6 +7,10 @@ from typing import Annotated
 
 import typer
 
+from fba.errors import LandmarkError
+from fba.feature_points import FeaturePoints
+from fba.findings import Finding
+from fba.scene import FaceScene
 from studio.cli.arguments import AsJson
 from studio.cli.outcome import usage
 from studio.cli.outputs import check_outputs
@@ -19,7 +23,10 @@ def landmarks(
         Path | None, typer.Option("--landmarks", help="Points that are right already; a few improve all the others.")
     ] = None,
     detector: Annotated[
-        str, typer.Option(help="auto, or xiang: the 20 landmarks of Xiang et al. (2008) as published.")
+        str,
+        typer.Option(
+            help="auto, or xiang: the 20 landmarks of Xiang et al. (2008) as published; xiang-once: first half."
+        ),
     ] = "auto",
     source: Annotated[str, typer.Option(help="The face whose feature points are known.")] = "default",
     sheet: Annotated[
@@ -48,13 +55,25 @@ def landmarks(
         clicked = None if given is None else read_landmarks(given, scene)
         found = detect_points(scene, prepared, clicked, detector=detector, progress=tell)
         write_landmarks(found.points, scene, output)
+        findings = (*found.findings, *_covered(scene, found.points))
         if sheet is not None:
             turned, points, _ = orient(scene, found.points)
             save_png(landmark_sheet(turned, points, title=scene.name), sheet)
     if as_json:
         trust = {key: {"source": p.source, "confidence": p.confidence} for key, p in found.points.items()}
-        print_json({"file": str(output), "points": trust, "findings": findings_json(found.findings)})
+        print_json({"file": str(output), "points": trust, "findings": findings_json(findings)})
         return
     out = console()
-    print_findings(found.findings, out)
+    print_findings(findings, out)
     out.print(f"{output}: {len(found.points)} feature points")
+
+
+def _covered(scene: FaceScene, points: FeaturePoints) -> list[Finding]:
+    """Lips that are grown together and eyes that are closed or filled: their points lie on no edge."""
+    from cloning.prepare import prepare
+
+    try:
+        found = prepare(scene, points, "target").findings
+    except LandmarkError as error:
+        return [Finding("warning", "unusable-points", str(error), scene.name)]
+    return [f for f in found if f.code.startswith(("sealed-", "closed-"))]

@@ -8,14 +8,16 @@ from remade import bare, roleless, warped
 
 from cloning import clone, clone_shapes, clone_with_report
 from cloning.normalize import ratios
+from cloning.prepare import prepare
 from cloning.report import CloneReport
+from cloning.target import target_points
 from fat import AnimatableFace
 from fat.build import face_motions
 from fat.conformance import conformance
 from fat.evaluate import Player
 from fba import FaceScene, FeaturePoint, FeaturePoints, Frame, Role, ShapeSet
 from fba.arrays import Floats
-from fba.errors import CloningError, LandmarkError
+from fba.errors import CloningError
 from formats import read_scene
 from samples import sample
 
@@ -235,8 +237,10 @@ def test_missing_parts_are_said(source: AnimatableFace, wide: tuple[FaceScene, F
 def test_missing_feature_points(source: AnimatableFace, wide: tuple[FaceScene, FeaturePoints]) -> None:
     scene, points = wide
     without = FeaturePoints({k: p for k, p in points.items() if k != "8.3"})
-    with pytest.raises(LandmarkError, match=r"8\.3"):
-        clone_with_report(source, scene, without)
+    _, completed, findings = target_points(prepare(source.scene, source.feature_points, "source"), scene, without)
+    assert completed["8.3"].source == "detected"
+    assert "detected-points" in {f.code for f in findings}
+    assert {k: completed[k] for k in without} == dict(without)
     fewer = FeaturePoints({k: p for k, p in points.items() if k not in ("7.1", "5.1", "3.5")})
     face, report = clone_with_report(source, scene, fewer, faps=FEW)
     assert {"derived-point", "missing-points"} <= {f.code for f in report.findings}

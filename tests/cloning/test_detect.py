@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from cloning.detect import Detection, detect_points
+from cloning.detect.model import ready
+from cloning.detect.neighbours import by_neighbours
 from cloning.detect.xiang import LANDMARKS
-from cloning.prepare import PreparedFace, prepare
+from cloning.prepare import DERIVED, NECESSARY, PreparedFace, prepare
 from fat import AnimatableFace
 from fba import FaceScene, FeaturePoints, PolyMesh, Shape
 from fba.arrays import Floats
@@ -22,6 +24,8 @@ from samples import sample
 
 SHARP = ("2.2", "2.3", "2.4", "2.5", "3.1", "3.2", "3.3", "3.4", "3.7", "3.8", "3.11", "3.12", "8.1", "8.2", "9.3")
 """Points that lie on an edge or a tip."""
+
+DATA = Path(__file__).resolve().parents[1] / "data"
 
 TURN = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Gaze along x, up along z."""
@@ -47,7 +51,8 @@ def posed(tri: tuple[FaceScene, FeaturePoints]) -> FaceScene:
     turn = TURN @ tilt
 
     def moved(vertices: Floats) -> Floats:
-        return 730.0 * vertices @ turn.T + np.array([9e3, -4e3, 2e4])
+        there: Floats = 730.0 * vertices @ turn.T + np.array([9e3, -4e3, 2e4])
+        return there
 
     shapes = {s.name: replace(s, mesh=s.mesh.with_vertices(moved(s.mesh.vertices)).reversed()) for s in tri[0].shapes}
     return tri[0].map_shapes(shapes)
@@ -105,13 +110,46 @@ def test_given_points_are_kept_and_place_the_head(tri: tuple[FaceScene, FeatureP
     assert np.mean([off[k] for k in SHARP]) < 0.08
 
 
+def test_a_tongue_is_found_only_where_there_is_one(posed: FaceScene, known: PreparedFace) -> None:
+    """Teeth are not taken for it."""
+    without = FaceScene(tuple(s for s in posed.shapes if s.name != "tongue"), name="toothed")
+    found = detect_points(without, known).points
+    assert {"9.8", "9.9", "9.10", "9.11"} <= set(found)
+    assert not {"6.1", "6.2", "6.3", "6.4"} & set(found)
+
+
 def test_xiang_finds_its_landmarks(tri: tuple[FaceScene, FeaturePoints], known: PreparedFace) -> None:
     found = detect_points(tri[0], known, detector="xiang")
     off = errors(tri[0], found.points, tri[1])
     assert np.mean([off[k] for k in LANDMARKS]) < 0.15
     assert max(off[k] for k in LANDMARKS) < 0.4
+    once = errors(tri[0], detect_points(tri[0], known, detector="xiang-once").points, tri[1])
+    assert np.mean([once[k] for k in LANDMARKS]) < 0.15
+    assert any(once[k] != off[k] for k in LANDMARKS)
     with pytest.raises(LandmarkError, match="no detector 'magic'"):
         detect_points(tri[0], known, detector="magic")
+
+
+def test_a_cheek_lies_beside_the_mouth_below_the_nose(known: PreparedFace) -> None:
+    """On the source moved as a whole, neighbours say where the points are; a wider mouth takes the cheek along."""
+    skin = ready(known).skin
+    places = dict(skin.positions)
+    same = by_neighbours(skin, skin, places)
+    assert {"5.1", "5.2", "4.5", "2.11", "9.5"} <= set(same)
+    assert max(float(np.linalg.norm(same[key] - places[key])) for key in same) < 0.02
+    wider = {**places, "2.4": places["2.4"] + (0.05, 0.0, 0.0)}
+    moved = by_neighbours(skin, skin, wider)
+    assert moved["5.1"][0] - same["5.1"][0] == pytest.approx(0.05)
+    assert moved["2.11"][0] - same["2.11"][0] == pytest.approx(0.025)
+    np.testing.assert_array_equal(moved["5.2"], same["5.2"])
+
+
+def test_nostrils_and_chin_follow_their_rules(
+    tri: tuple[FaceScene, FeaturePoints], detected: Detection, posed: FaceScene
+) -> None:
+    surface = FeaturePoints({k: p for k, p in tri[1].items() if p.shape is not None})
+    off = errors(posed, detected.points, surface)
+    assert max(off[k] for k in ("9.1", "9.2", "9.4", "9.5", "2.10", "2.11", "2.12", "5.1", "5.2")) < 0.2
 
 
 def ball() -> FaceScene:
@@ -134,6 +172,13 @@ def test_what_is_no_face_is_refused(known: PreparedFace) -> None:
         detect_points(nothing, known)
 
 
-def test_a_creature_is_refused(shared: Path, known: PreparedFace) -> None:
+def test_a_creature_is_refused_without_points(shared: Path, known: PreparedFace) -> None:
+    scene = read_scene(shared / "faces" / "suzanne" / "suzanne.obj")
     with pytest.raises(LandmarkError, match="no face was found"):
-        detect_points(read_scene(shared / "faces" / "suzanne" / "suzanne.obj"), known)
+        detect_points(scene, known)
+    given = read_landmarks(DATA / "suzanne.fps.json", scene)
+    found = detect_points(scene, known, given).points
+    assert set(NECESSARY) - set(DERIVED) <= set(found)
+    assert {key: found[key] for key in given} == dict(given)
+    # Left and right, upper and lower: what cloning asks of points, whatever the face.
+    prepare(scene, found, "target")

@@ -328,9 +328,6 @@ def test_feature_points_swapped_left_and_right(tmp_path: Path) -> None:
 
 
 def test_feature_points_that_are_not_there(tmp_path: Path) -> None:
-    points = _points()
-    del points["2.2"]
-    refused(_with_points(tmp_path, points), "2.2")
     refused(_with_points(tmp_path, {**_points(), "9.3": {"vertex": 10**9}}), "9.3")
     refused(_with_points(tmp_path, {**_points(), "99.1": {"vertex": 1}}), "99.1")
     broken = tmp_path / "broken.json"
