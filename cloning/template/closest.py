@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from itertools import chain
 from typing import Any
 
@@ -16,6 +17,9 @@ FIRST = 4
 
 MORE = 48
 """Triangles tried where none of the first ones fits."""
+
+BLOCK = 4096
+"""So many points are looked for at once: far from the surface each has very many candidates."""
 
 FEWEST = 0.05
 """A class of triangles of about one size holds at least this share of all, so that there are only a few."""
@@ -83,6 +87,20 @@ class TriangleSearch:
         Places; where there is none, the triangle is -1 and the distance infinite.
         """
         m = len(points)
+        if m > BLOCK:
+            limits = np.broadcast_to(reach, m)
+            blocks = [
+                self.closest(
+                    points[some],
+                    None if normals is None else normals[some],
+                    None if labels is None else labels[some],
+                    least_facing,
+                    limits[some],
+                    None if guesses is None else guesses[some],
+                )
+                for some in (slice(start, start + BLOCK) for start in range(0, m, BLOCK))
+            ]
+            return Places(*(np.concatenate(part) for part in zip(*map(astuple, blocks), strict=True)))
         best = Places(np.full(m, -1, np.int32), np.zeros((m, 3)), np.full(m, np.inf), np.full(m, -1.0))
         if self._all is None or m == 0:
             return best
