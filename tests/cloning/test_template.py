@@ -288,3 +288,15 @@ def test_anchors_on_the_lids_do_not_depend_on_how_the_head_is_held(head: Prepare
     for name, (label, place) in upright.items():
         assert tilted[name][0] == label
         assert np.allclose(tilted[name][1], turn @ place, atol=1e-9)
+
+
+def test_blocks_of_points_change_no_result(source: AnimatableFace, monkeypatch: pytest.MonkeyPatch) -> None:
+    skin = prepare(source.scene, source.feature_points, "source").skin
+    search = TriangleSearch(skin.vertices, skin.triangles)
+    points = skin.vertices[::9] + np.random.default_rng(2).normal(scale=0.1, size=skin.vertices[::9].shape)
+    whole = search.closest(points, skin.normals[::9], guesses=np.arange(len(points), dtype=np.int32))
+    monkeypatch.setattr("cloning.template.closest.BLOCK", 100)
+    parts = search.closest(points, skin.normals[::9], guesses=np.arange(len(points), dtype=np.int32))
+    assert np.array_equal(whole.triangles, parts.triangles)
+    assert np.array_equal(whole.distances, parts.distances)
+    assert np.array_equal(whole.weights, parts.weights)
