@@ -58,11 +58,13 @@ class Backend:
     name : as given to `clone`.
     title : the method in a few words.
     module : import path of the module that offers ``build_transfer(source, target, as_published)``.
+    detector : the method's own way to find feature points, for published mode (see `cloning.detect`).
     """
 
     name: str
     title: str
     module: str
+    detector: str = "auto"
 
     def build(self, source: PreparedFace, target: PreparedFace, as_published: bool) -> SkinTransfer:
         """Prepare the transfer between two faces."""
@@ -97,7 +99,7 @@ def find_backend(name: str) -> Backend:
 
 
 register_backend(Backend("fit", "elastic template and FAPU-scaled displacements", "cloning.fit"))
-register_backend(Backend("dt", "elastic template and deformation transfer (Xiang et al. 2008)", "cloning.dt"))
+register_backend(Backend("dt", "elastic template and deformation transfer (Xiang et al. 2008)", "cloning.dt", "xiang"))
 register_backend(Backend("fmc", "Facial Motion Cloning (Pandzic 2001)", "cloning.fmc"))
 register_backend(Backend("vtc", "elastic template and vertex tents (Song et al.)", "cloning.vtc"))
 register_backend(Backend("vtc-image", "mesh image and vertex tents (Song et al.)", "cloning.vtc_image"))

@@ -198,7 +198,8 @@ def _build(
     stages: _Stages,
 ) -> tuple[PreparedFace, PreparedFace, FaceTransfer]:
     mine = stages.run("source", lambda: prepare(source, source_points, "source"))
-    scene, points, found = stages.run("landmarks", lambda: target_points(mine, onto, landmarks))
+    detector = find_backend(backend).detector if as_published else "auto"
+    scene, points, found = stages.run("landmarks", lambda: target_points(mine, onto, landmarks, detector))
     yours = stages.run("target", lambda: prepare(scene, points, "target"))
     yours = replace(yours, findings=(*found, *yours.findings))
     skin = stages.run("correspondence", lambda: find_backend(backend).build(mine, yours, as_published))

@@ -14,11 +14,18 @@ from fba.scene import FaceScene
 
 
 def target_points(
-    source: PreparedFace, onto: FaceScene | AnimatableFace, landmarks: FeaturePoints | None
+    source: PreparedFace,
+    onto: FaceScene | AnimatableFace,
+    landmarks: FeaturePoints | None,
+    detector: str = "auto",
 ) -> tuple[FaceScene, FeaturePoints, tuple[Finding, ...]]:
     """The target without transforms of its own, its feature points, and what is uncertain about them.
 
     Where some of the points that cloning needs are not given, they are detected, and those given hold the others.
+
+    Parameters
+    ----------
+    detector : how they are detected (see `cloning.detect`).
 
     Raises
     ------
@@ -32,7 +39,7 @@ def target_points(
     if landmarks is not None and all(key in landmarks or key in DERIVED for key in NECESSARY):
         return onto, landmarks, ()
     require_finite(onto)
-    found = detect_points(onto, source, landmarks)
+    found = detect_points(onto, source, landmarks, detector=detector)
     return onto, found.points, found.findings
 
 

@@ -10,8 +10,10 @@ from remade import warped
 from scipy.sparse import diags_array
 from scipy.spatial import cKDTree
 
+from cloning import clone_shapes
 from cloning.backends import Anchored, find_backend
 from cloning.deformation import deformation_transfer
+from cloning.detect import Detection
 from cloning.dt import LANDMARKS
 from cloning.local_transfer import BareTransfer, GoalTransfer
 from cloning.normalize import ratios
@@ -22,6 +24,7 @@ from cloning.transfer import FaceTransfer, build_face_transfer
 from fat import AnimatableFace
 from fba import FaceScene, FeaturePoint, FeaturePoints, PolyMesh, Role, Shape
 from fba.arrays import Floats
+from fba.shapes import ShapeSet
 from formats import read_scene
 from formats.landmarks import read_landmarks
 from samples import sample
@@ -189,3 +192,19 @@ def test_published_mode_is_the_papers(coarse: PreparedFace, bumps: Floats) -> No
         transfer.apply([coarse.skin.split(bumps[:, k]) for k in range(bumps.shape[1])])
     assert whole.tally.after == whole.tally.before, "nothing is corrected"
     assert whole.tally.measures()["fp_error_before"] > 2.0 * fapu.tally.measures()["fp_error_before"]
+
+
+def test_published_mode_finds_its_own_landmarks_where_none_are_given(
+    coarse: PreparedFace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def detect(scene: FaceScene, source: PreparedFace, given: FeaturePoints | None, *, detector: str) -> Detection:
+        asked.append(detector)
+        return Detection(coarse.points, 1.0, ())
+
+    monkeypatch.setattr("cloning.target.detect_points", detect)
+    still = ShapeSet(("still",), coarse.scene.world_neutral(), np.zeros((1, coarse.scene.vertex_count, 3)))
+    for backend, as_published in (("dt", True), ("fmc", False)):
+        clone_shapes(coarse.scene, coarse.points, still, coarse.scene, None, backend=backend, as_published=as_published)
+    assert asked == ["xiang", "auto"]
