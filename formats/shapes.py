@@ -155,7 +155,11 @@ def _read_npz(path: Path, count: int) -> _Targets:
 
 def _read_gltf(path: Path, count: int) -> _Targets:
     """Morph targets of all meshes; meshes without targets may be missing in the neutral face."""
-    scene = gltf.read(path)
+    own = gltf.read_shape_set(path)
+    if own is not None:
+        _check_count(path, len(own.neutral), count)
+        return list(zip(own.names, own.deltas, strict=True))
+    scene = gltf.read_foreign(path)
     targets = scene.document.targets if isinstance(scene.document, gltf.GltfDocument) else {}
     shapes = scene.shapes
     if scene.vertex_count != count:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
@@ -14,7 +14,9 @@ from fba.arrays import Floats
 from fba.errors import MeshError
 from fba.mesh import Material, PolyMesh
 from fba.scene import FaceScene, Node, Shape, Transform
-from formats.gltf_data import GltfData, Json
+from formats.gltf.colors import from_linear
+from formats.gltf.data import GltfData, Json
+from formats.gltf.images import Images
 from formats.matrices import transform_fields
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
@@ -35,8 +37,10 @@ class GltfDocument:
     remarks: tuple[str, ...] = ()
 
 
-def read(path: Path) -> FaceScene:
+def read_foreign(path: Path) -> FaceScene:
     """Read a glTF file's default scene: one shape for each mesh in it, all its primitives together.
+
+    A file of this toolkit's own writer is read like any other.
 
     The vertices keep the order of the file: mesh by mesh as the node tree is walked, primitive by primitive.
     Skinned meshes are taken in their bind pose, without the transforms above them, as the standard has it.
@@ -51,8 +55,12 @@ def read(path: Path) -> FaceScene:
     MeshError
         If it has no triangles.
     """
-    path = Path(path)
-    return _Reader(GltfData(path)).scene()
+    return read_data(GltfData(Path(path)))
+
+
+def read_data(data: GltfData) -> FaceScene:
+    """Read a parsed file; see `read_foreign`."""
+    return _Reader(data).scene()
 
 
 class _Reader:
@@ -63,6 +71,7 @@ class _Reader:
         self.targets: dict[str, dict[str, Floats]] = {}
         self.skinned: list[Node] = []
         self.remarks: list[str] = []
+        self.images = Images(data)
 
     def scene(self) -> FaceScene:
         roots: list[Node] = []
@@ -75,7 +84,7 @@ class _Reader:
         if not any(s.mesh.face_count for s in scene.shapes):
             raise MeshError(f"{self.data.path} holds no triangles in its default scene")
         document = GltfDocument(self.targets, tuple(dict.fromkeys(self.remarks)))
-        return FaceScene(scene.roots, meters_per_unit=1.0, name=scene.name, document=document)
+        return replace(scene, document=document, images=self.images.inside)
 
     def _root_nodes(self) -> list[object]:
         data = self.data
@@ -146,7 +155,7 @@ class _Reader:
         if not parts:
             return None
         name = self._unique(data.name(node) or data.name(mesh) or "mesh")
-        joined, materials = _joined(data, parts)
+        joined, materials = _joined(data, parts, self.images)
         self.targets[name] = self._targets(parts, names)
         return Shape(name, joined, materials=materials)
 
@@ -215,7 +224,7 @@ def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     return np.stack([order[step], order[step + 1 + odd], order[step + 2 - odd]], axis=1)
 
 
-def _joined(data: GltfData, parts: list[_Primitive]) -> tuple[PolyMesh, tuple[Material, ...]]:
+def _joined(data: GltfData, parts: list[_Primitive], images: Images) -> tuple[PolyMesh, tuple[Material, ...]]:
     """All primitives of a mesh as one, vertices one primitive after the other."""
     starts = np.cumsum([0, *(len(p.positions) for p in parts)])
     corners = np.concatenate([p.triangles + s for p, s in zip(parts, starts[:-1], strict=True)]).astype(np.int32)
@@ -243,7 +252,7 @@ def _joined(data: GltfData, parts: list[_Primitive]) -> tuple[PolyMesh, tuple[Ma
         if used
         else None,
     )
-    return mesh, tuple(_material(data, i) for i in used)
+    return mesh, tuple(_material(data, i, images) for i in used)
 
 
 def _column(values: list[Floats | None], parts: list[_Primitive], width: int) -> Floats | None:
@@ -253,25 +262,23 @@ def _column(values: list[Floats | None], parts: list[_Primitive], width: int) ->
     return column
 
 
-def _material(data: GltfData, index: int) -> Material:
+def _material(data: GltfData, index: int, images: Images) -> Material:
     entry = data.item("materials", index)
     surface = data.dict(entry, "pbrMetallicRoughness")
-    r, g, b, alpha = data.numbers(surface, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
-    glow_r, glow_g, glow_b = data.numbers(entry, "emissiveFactor", (0.0, 0.0, 0.0))
+    *color, alpha = data.numbers(surface, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
     return Material(
         data.name(entry) or f"material_{index}",
-        diffuse=(r, g, b),
-        emissive=(glow_r, glow_g, glow_b),
+        diffuse=from_linear(color),
+        emissive=from_linear(data.numbers(entry, "emissiveFactor", (0.0, 0.0, 0.0))),
         transparency=1.0 - alpha if entry.get("alphaMode") == "BLEND" else 0.0,
-        texture=_texture(data, surface),
+        texture=_texture(data, surface, images),
     )
 
 
-def _texture(data: GltfData, surface: Json) -> str | None:
-    """The base colour image's path; None for images inside the file."""
+def _texture(data: GltfData, surface: Json, images: Images) -> str | None:
+    """The name of the base colour image."""
     reference = data.dict(surface, "baseColorTexture")
     if "index" not in reference:
         return None
     source = data.item("textures", reference["index"]).get("source")
-    uri = data.item("images", source).get("uri") if source is not None else None
-    return uri if isinstance(uri, str) and not uri.startswith("data:") else None
+    return None if source is None else images.name(source)

@@ -148,16 +148,20 @@ class GltfData:
         elif not isinstance(uri, str):
             raise self.fail(f"the uri of buffer {index} must be text")
         elif uri.startswith("data:"):
-            try:
-                data = base64.b64decode(uri.partition(",")[2], validate=True)
-            except (binascii.Error, ValueError):
-                raise self.fail(f"the data of buffer {index} is not base64") from None
+            data = self.inline(uri, f"buffer {index}")
         else:
             data = read_bytes(self._beside(uri))
         if len(data) < self.integer(buffer, "byteLength"):
             raise self.fail(f"buffer {index} is cut: {len(data)} bytes of {buffer['byteLength']}")
         self._buffers[index] = data
         return data
+
+    def inline(self, uri: str, what: str) -> bytes:
+        """The bytes of a data URI."""
+        try:
+            return base64.b64decode(uri.partition(",")[2], validate=True)
+        except (binascii.Error, ValueError):
+            raise self.fail(f"the data of {what} is not base64") from None
 
     def _beside(self, uri: str) -> Path:
         """A file inside the glTF file's own folder; nothing else is ever opened."""
@@ -202,6 +206,15 @@ class GltfData:
         if not isinstance(number, int) or number not in _COMPONENTS:
             raise self.fail(f"there is no component type {str(number)[:20]}")
         return _COMPONENTS[number]
+
+    def bytes_of(self, index: object) -> bytes:
+        """All bytes of a buffer view."""
+        view = self.item("bufferViews", index)
+        data = self._buffer(self.integer(view, "buffer"))
+        begin, length = self.integer(view, "byteOffset", 0), self.integer(view, "byteLength")
+        if begin + length > len(data):
+            raise self.fail(f"buffer view {index} reaches beyond its buffer")
+        return data[begin : begin + length]
 
     def _view(self, owner: Json, kind: str, count: int, width: int) -> NDArray[np.generic]:
         view = self.item("bufferViews", owner["bufferView"])

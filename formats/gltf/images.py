@@ -1,0 +1,57 @@
+"""The images of a glTF file that is read: files beside it, or bytes inside it, which get file names here."""
+
+from __future__ import annotations
+
+import re
+from urllib.parse import unquote
+
+from formats.gltf.data import GltfData
+
+_EXTENSIONS = {"image/png": ".png", "image/jpeg": ".jpg"}
+
+
+class Images:
+    """Names images as materials do.
+
+    Attributes
+    ----------
+    inside : name -> bytes of the images inside the file that were asked for.
+    """
+
+    def __init__(self, data: GltfData) -> None:
+        self.inside: dict[str, bytes] = {}
+        self._data = data
+        self._names: dict[object, str | None] = {}
+
+    def name(self, index: object) -> str | None:
+        """The path of an image beside the file, or a name for one inside it; None for one that is nowhere."""
+        if index not in self._names:
+            self._names[index] = self._find(index)
+        return self._names[index]
+
+    def _find(self, index: object) -> str | None:
+        image = self._data.item("images", index)
+        uri = image.get("uri")
+        kind = str(image.get("mimeType", ""))
+        if isinstance(uri, str) and not uri.startswith("data:"):
+            return unquote(uri)
+        if isinstance(uri, str):
+            kind = uri[5:].partition(",")[0].partition(";")[0]
+            content = self._data.inline(uri, f"image {index}")
+        elif "bufferView" in image:
+            content = self._data.bytes_of(image["bufferView"])
+        else:
+            return None
+        name = self._free(self._data.name(image) or f"image_{index}", _EXTENSIONS.get(kind, ""))
+        self.inside[name] = content
+        return name
+
+    def _free(self, label: str, extension: str) -> str:
+        """A file name that no other image has."""
+        stem = re.sub(r"[^\w.-]+", "_", label).strip(".")[:80] or "image"
+        stem = stem.removesuffix(extension) if extension else stem
+        name, number = f"{stem}{extension}", 1
+        while name in self.inside:
+            number += 1
+            name = f"{stem}_{number}{extension}"
+        return name

@@ -1,0 +1,160 @@
+"""Transforms as glTF nodes, which have neither a centre nor a scale orientation, and their motion.
+
+``T C R SR S -SR -C`` is written as two nodes: ``T C``, ``R SR`` and ``S`` in one, ``-SR`` and ``-SR -C`` in a second
+one below it, which is left out where it would do nothing. So a table that turns, moves or scales the transform drives
+one field of the first node.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from fat.tables import FaceDefTables, FaceDefTransform, TransformField
+from fba.arrays import Floats
+from fba.errors import FaceDefTablesError
+from fba.fapu import ANGLE_UNIT
+from fba.scene import FaceScene, Node, Shape, Transform, rotation_matrix
+from formats.gltf.buffers import Json
+
+PATHS = {
+    TransformField.ROTATION: "rotation",
+    TransformField.TRANSLATION: "translation",
+    TransformField.SCALE: "scale",
+}
+
+
+class Nodes:
+    """The node tree of a scene.
+
+    Attributes
+    ----------
+    entries : all nodes; the root is the first.
+    of : name of a scene node -> its number.
+    """
+
+    def __init__(self, scene: FaceScene, mesh_of: Callable[[Shape], int | None]) -> None:
+        self.entries: list[Json] = []
+        self.of: dict[str, int] = {}
+        self._mesh_of = mesh_of
+        root: Json = {"name": scene.name}
+        meters = scene.meters_per_unit
+        if meters is not None and meters != 1.0:
+            root["scale"] = [meters] * 3
+        self.entries.append(root)
+        children = [self._add(node) for node in scene.roots]
+        if children:
+            root["children"] = children
+
+    def _add(self, node: Node) -> int:
+        number = len(self.entries)
+        entry: Json = {"name": node.name}
+        self.entries.append(entry)
+        self.of[node.name] = number
+        if isinstance(node, Shape):
+            mesh = self._mesh_of(node)
+            if mesh is not None:
+                entry["mesh"] = mesh
+            return number
+        _put(entry, translation(node, node.translation), quaternion(node, node.rotation), node.scale)
+        below = entry
+        back = orientation(node).T
+        shift = -(back @ np.asarray(node.center, dtype=np.float64))
+        if shift.any() or not np.array_equal(back, np.eye(3)):
+            below = {"name": f"{node.name}_pivot"}
+            entry["children"] = [len(self.entries)]
+            self.entries.append(below)
+            _put(below, shift, quaternion_of(back), (1.0, 1.0, 1.0))
+        children = [self._add(child) for child in node.children]
+        if children:
+            below["children"] = children
+        return number
+
+
+def _put(entry: Json, move: Floats, turn: Floats, scale: Sequence[float]) -> None:
+    """Fields that are not neutral."""
+    if move.any():
+        entry["translation"] = (move + 0.0).tolist()
+    if turn[:3].any():
+        entry["rotation"] = turn.tolist()
+    if tuple(scale) != (1.0, 1.0, 1.0):
+        entry["scale"] = [float(s) for s in scale]
+
+
+def orientation(node: Transform) -> Floats:
+    """The scale orientation as a (3, 3) matrix."""
+    return rotation_matrix(node.scale_orientation)[:3, :3]
+
+
+def translation(node: Transform, move: Sequence[float]) -> Floats:
+    """(3,) translation of the first node where the transform's own is `move`."""
+    return np.asarray(move, dtype=np.float64) + np.asarray(node.center, dtype=np.float64)
+
+
+def quaternion(node: Transform, rotation: tuple[float, float, float, float]) -> Floats:
+    """(4,) rotation of the first node where the transform's own is `rotation` (axis and angle)."""
+    if node.scale_orientation[3] == 0.0:
+        return _axis_angle(rotation)
+    return quaternion_of(rotation_matrix(rotation)[:3, :3] @ orientation(node))
+
+
+def _axis_angle(rotation: Sequence[float]) -> Floats:
+    axis = np.asarray(rotation[:3], dtype=np.float64)
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        return np.array([0.0, 0.0, 0.0, 1.0])
+    half = 0.5 * rotation[3]
+    return np.append(np.sin(half) * axis / length, np.cos(half)) + 0.0
+
+
+def quaternion_of(matrix: Floats) -> Floats:
+    """Unit quaternion (x, y, z, w) of a (3, 3) rotation: eigenvector of the matrix of I. Y. Bar-Itzhack (2000)."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    symmetric = np.array(
+        [
+            [a - e - i, d + b, g + c, h - f],
+            [d + b, e - a - i, h + f, c - g],
+            [g + c, h + f, i - a - e, d - b],
+            [h - f, c - g, d - b, a + e + i],
+        ]
+    )
+    found: Floats = np.linalg.eigh(symmetric)[1][:, -1]
+    found = np.where(np.abs(found) < 1e-16, 0.0, found)
+    return found if found[3] >= 0.0 else -found + 0.0
+
+
+def driven_fields(scene: FaceScene, tables: FaceDefTables, values: Floats) -> dict[tuple[str, TransformField], Floats]:
+    """What tables do to nodes: (transform, field) -> (f, 4) quaternions or (f, 3) vectors of its first node.
+
+    values : (f, tables). Of several tables that drive one field, the last one whose value is not 0 holds; where all
+    are 0, the field is as in the file (see `fat.chains`). Fields that stay so in every frame are left out.
+    """
+    transforms = {t.name: t for t in scene.transforms}
+    found: dict[tuple[str, TransformField], Floats] = {}
+    for number, table in enumerate(tables):
+        for definition in table.transforms:
+            if definition.transform not in transforms:
+                raise FaceDefTablesError(f"{table.name}: there is no Transform '{definition.transform}' in the scene")
+            active = np.flatnonzero(values[:, number])
+            if not active.size:
+                continue
+            node = transforms[definition.transform]
+            key = (node.name, definition.field)
+            if key not in found:
+                found[key] = np.tile(_field(node, definition, None), (len(values), 1))
+            for frame in active.tolist():
+                found[key][frame] = _field(node, definition, float(values[frame, number]))
+    return found
+
+
+def _field(node: Transform, definition: FaceDefTransform, value: float | None) -> Floats:
+    """The field of the first node at a table value; None for the file's own."""
+    if definition.field is TransformField.ROTATION:
+        x, y, z, theta = definition.rotation_def
+        return quaternion(node, node.rotation if value is None else (x, y, z, theta * value * ANGLE_UNIT))
+    if definition.field is TransformField.TRANSLATION:
+        move = node.translation if value is None else np.asarray(definition.translation_def) * value
+        return translation(node, tuple(move))
+    scale = node.scale if value is None else np.asarray(definition.scale_def) * value
+    return np.asarray(scale, dtype=np.float64)

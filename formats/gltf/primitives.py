@@ -1,0 +1,152 @@
+"""Polygon meshes as what graphics hardware draws: triangles of one material over vertices with one normal and uv.
+
+A vertex is split where texture coordinates or normals differ between the polygons around it, and where materials
+meet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fba.arrays import Bools, Floats, Floats32, Ints
+from fba.mesh import PolyMesh
+from fba.scene import Shape
+from formats.gltf.buffers import Buffer, Json, to_single
+from formats.gltf.targets import Target
+from formats.usd.normals import SmoothNormals
+
+VERTEX = "_VERTEX"
+"""Attribute that says which vertex of the shape each vertex of a primitive is."""
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Primitive:
+    """The triangles of one material.
+
+    Attributes
+    ----------
+    material : index into the shape's materials, -1 for none.
+    vertices : (p,) the shape's vertex of each vertex of the primitive.
+    texcoords : (p, 2) from the upper left corner of the image, or None.
+    normals : (p, 3) of length 1.
+    triangles : (t, 3) into `vertices`.
+    """
+
+    material: int
+    vertices: Ints
+    texcoords: Floats | None
+    normals: Floats
+    triangles: Rows
+
+
+def split(shape: Shape, smooth: Floats) -> list[Primitive]:
+    """Take a shape apart into primitives; none if it has no polygons.
+
+    smooth : (n, 3) vertex normals for corners that have none of their own.
+    """
+    mesh = shape.mesh
+    if not mesh.face_count:
+        return []
+    if mesh.face_materials is None:
+        every = np.ones(len(mesh.triangle_faces), dtype=bool)
+        return [_primitive(mesh, every, 0 if shape.materials else -1, smooth)]
+    numbers = mesh.face_materials[mesh.triangle_faces]
+    numbers = np.where(numbers < len(shape.materials), numbers, -1)
+    return [_primitive(mesh, numbers == number, number, smooth) for number in dict.fromkeys(numbers.tolist())]
+
+
+def _primitive(mesh: PolyMesh, chosen: Bools, material: int, smooth: Floats) -> Primitive:
+    corners = mesh.triangle_corners[chosen].ravel()
+    keys = [mesh.indices[corners]]
+    for indices in (mesh.texcoord_indices, mesh.normal_indices):
+        if indices is not None:
+            keys.append(indices[corners])
+    first, order = _distinct(keys)
+    corner = corners[first]
+    vertices = mesh.indices[corner]
+    texcoords = None
+    if mesh.texcoords is not None and mesh.texcoord_indices is not None and (keys[1] >= 0).any():
+        texcoords = _values(mesh.texcoords, mesh.texcoord_indices[corner], np.zeros((len(corner), 2)))
+        texcoords = np.stack([texcoords[:, 0], 1.0 - texcoords[:, 1]], axis=1)
+    normals = smooth[vertices]
+    if mesh.normals is not None and mesh.normal_indices is not None:
+        normals = _values(mesh.normals, mesh.normal_indices[corner], normals)
+    return Primitive(material, vertices, texcoords, _unit(normals), order.reshape(-1, 3))
+
+
+def _distinct(keys: list[Ints]) -> tuple[Rows, Rows]:
+    """First place of each distinct row of the keys, sorted by them, and which of these every place holds."""
+    joined = keys[-1].astype(np.int64)
+    for key in reversed(keys[:-1]):
+        joined = np.unique(joined, return_inverse=True)[1].astype(np.int64)
+        joined += key.astype(np.int64) * (int(joined.max()) + 1)
+    _, first, order = np.unique(joined, return_index=True, return_inverse=True)
+    return first, order
+
+
+def _values(values: Floats, indices: Ints, default: Floats) -> Floats:
+    if not len(values):
+        return default
+    found: Floats = np.where((indices >= 0)[:, None], values[indices], default)
+    return found
+
+
+def _unit(normals: Floats) -> Floats:
+    """Normals of length 1; where there is none, one to the front."""
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    none = length[:, 0] < 1e-12
+    unit: Floats = normals / np.where(length < 1e-12, 1.0, length)
+    unit[none] = (0.0, 0.0, 1.0)
+    return unit
+
+
+def write_mesh(
+    buffer: Buffer, shape: Shape, targets: Sequence[Target], materials: Sequence[int]
+) -> tuple[Json | None, list[Primitive]]:
+    """A glTF mesh with morph targets, and the primitives that it is made of; None without polygons.
+
+    materials : number of each of the shape's materials in the file.
+    """
+    smooth = SmoothNormals(shape.mesh)
+    primitives = split(shape, smooth.rest)
+    if not primitives:
+        return None, []
+    entries = [_write_primitive(buffer, shape.mesh, p, materials) for p in primitives]
+    for target in targets:
+        index, offsets = target.index, target.offsets
+        turned = to_single(smooth.offsets(index, offsets))
+        moved = to_single(offsets)
+        place = np.full(shape.mesh.vertex_count, -1, dtype=np.int64)
+        place[index] = np.arange(index.size)
+        for primitive, entry in zip(primitives, entries, strict=True):
+            at = place[primitive.vertices]
+            rows = np.flatnonzero(at >= 0)
+            position, normal = buffer.offsets(len(at), rows, [moved[at[rows]], turned[at[rows]]])
+            entry.setdefault("targets", []).append({"POSITION": position, "NORMAL": normal})
+    mesh: Json = {"name": shape.name, "primitives": entries}
+    if targets:
+        mesh["weights"] = [0.0] * len(targets)
+        mesh["extras"] = {"targetNames": [t.name for t in targets]}
+    return mesh, primitives
+
+
+def _write_primitive(buffer: Buffer, mesh: PolyMesh, primitive: Primitive, materials: Sequence[int]) -> Json:
+    points: Floats32 = to_single(mesh.vertices[primitive.vertices])
+    attributes: dict[str, Any] = {
+        "POSITION": buffer.attribute(points, bounds=True),
+        "NORMAL": buffer.attribute(to_single(primitive.normals)),
+        VERTEX: buffer.attribute(primitive.vertices.astype(np.float32)),
+    }
+    if primitive.texcoords is not None:
+        attributes["TEXCOORD_0"] = buffer.attribute(to_single(primitive.texcoords))
+    entry: Json = {"attributes": attributes, "indices": buffer.indices(primitive.triangles.ravel())}
+    if primitive.material >= 0:
+        entry["material"] = materials[primitive.material]
+    return entry
