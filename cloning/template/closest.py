@@ -18,7 +18,7 @@ FIRST = 4
 MORE = 48
 """Triangles tried where none of the first ones fits."""
 
-BLOCK = 4096
+BLOCK = 1024
 """So many points are looked for at once: far from the surface each has very many candidates."""
 
 FEWEST = 0.05
