@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from fat.face import AnimatableFace
-from fba.errors import FbaError, LandmarkError, UnknownFormatError
+from fba.errors import FbaError, LandmarkError, UnknownFormatError, UnsupportedFeatureError
 from fba.scene import FaceScene
+from fba.stream import FapStream
 
 
 class FormatModule(Protocol):
@@ -31,6 +32,7 @@ class Format:
 
     module : import path of its FormatModule.
     carries_tables : a face written to it reads back with its Facial Animation Tables.
+    carries_streams : its writer takes a FAP stream as third argument and makes it the file's animation.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Format:
     reads: bool = True
     writes: bool = True
     carries_tables: bool = False
+    carries_streams: bool = False
 
 
 _FORMATS: list[Format] = []
@@ -116,7 +119,24 @@ def read_face(path: str | Path) -> AnimatableFace:
     )
 
 
-def write(face: FaceScene | AnimatableFace, path: str | Path) -> None:
-    """Write a face; the extension chooses the format. The file is written whole or not at all."""
+def write(face: FaceScene | AnimatableFace, path: str | Path, stream: FapStream | None = None) -> None:
+    """Write a face; the extension chooses the format. The file is written whole or not at all.
+
+    stream : becomes the file's animation.
+
+    Raises
+    ------
+    UnsupportedFeatureError
+        If there is a stream, but the format has no animation, or the face no tables.
+    """
     path = Path(path)
-    _load(format_of(path, writing=True), "write")(face, path)
+    entry = format_of(path, writing=True)
+    if stream is None:
+        _load(entry, "write")(face, path)
+        return
+    if not entry.carries_streams:
+        known = ", ".join(e for f in _FORMATS if f.carries_streams for e in f.extensions)
+        raise UnsupportedFeatureError(f"{path}: {entry.name} is written without animation; choose one of {known}")
+    if not isinstance(face, AnimatableFace):
+        raise UnsupportedFeatureError(f"'{face.name}' has no Facial Animation Tables, so a FAP stream cannot move it")
+    _load(entry, "write")(face, path, stream)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from fba.errors import InputFileError
 from fba.scene import FaceScene
 from formats.files import read_bytes

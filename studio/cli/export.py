@@ -24,17 +24,23 @@ def export(
         str,
         typer.Option(
             help="native: everything the tables say, in the format's own terms; arkit, oculus, vrm: the shapes of "
-            "that name, to .npz, .usda, .usdc or a folder of OBJ."
+            "that name, to .npz, .usda, .usdc, .glb, .gltf or a folder of OBJ."
         ),
     ] = "native",
     open_jaw: OpenJaw = None,
+    stream: Annotated[
+        Path | None,
+        typer.Option(help="A .fap stream that becomes the animation of OUT (glTF); 'demo' names the shipped one."),
+    ] = None,
 ) -> None:
     """Write a face in another format; its tables go along where the format can carry them."""
     from fat.profiles import PROFILES
 
     if profile == "native":
-        _export_face(face, output, open_jaw)
+        _export_face(face, output, open_jaw, stream)
         return
+    if stream is not None:
+        usage(f"--stream goes with the native profile; the shapes of '{profile}' are written without animation")
     if open_jaw is not None:
         usage(f"--open-jaw goes with the native profile; the shapes of '{profile}' open the mouth in their own way")
     chosen = next((p for p in PROFILES if p == profile), None)
@@ -44,9 +50,11 @@ def export(
         _export_profile(face, output, chosen)
 
 
-def _export_face(face: Path, output: Path, open_jaw: Mode | None) -> None:
+def _export_face(face: Path, output: Path, open_jaw: Mode | None, stream: Path | None) -> None:
     from fat.face import AnimatableFace
     from formats import format_of, read, write
+    from formats.fap import read_fap
+    from samples import sample
     from studio.cli.console import console, print_findings
     from studio.inputs import left_behind, scene_of
     from studio.jaw_mode import with_open_jaw
@@ -59,39 +67,41 @@ def _export_face(face: Path, output: Path, open_jaw: Mode | None) -> None:
         found, said = with_open_jaw(found, open_jaw)
     elif open_jaw is not None:
         usage(f"--open-jaw: {face} is a plain mesh without open_jaw")
-    write(found, output)
+    frames = None
+    if stream is not None:
+        frames, remarks = read_fap(sample("streams/demo.fap") if str(stream) == "demo" else stream)
+        said += remarks
+    write(found, output, frames)
     out = console()
     print_findings([*said, *left_behind(scene_of(found), face, output)], out)
     if isinstance(found, AnimatableFace) and not entry.carries_tables:
         out.print(f"{output}: neutral mesh only, since {entry.name} cannot carry Facial Animation Tables")
     elif isinstance(found, AnimatableFace):
-        out.print(f"{output}: {len(found.tables)} tables for {found.scene.vertex_count} vertices")
+        played = "" if frames is None else f", {len(frames)} frames at {frames.frame_rate:g}/s"
+        out.print(f"{output}: {len(found.tables)} tables for {found.scene.vertex_count} vertices{played}")
     else:
         out.print(f"{output}: plain mesh, {found.vertex_count} vertices")
 
 
 def _export_profile(face: Path, output: Path, profile: Profile) -> None:
     from fat.profiles import profile_shapes
-    from formats import read_face
+    from formats import gltf, read_face, usd
     from formats.files import require_folder
     from formats.shapes import write_shapes
-    from formats.usd import write_shape_set
     from studio.cli.console import console, print_findings
     from studio.inputs import left_behind
 
     kind = output.suffix.lower()
-    stage = kind in (".usd", ".usda", ".usdc")
-    if kind in (".glb", ".gltf"):
-        usage(f"{output}: glTF is not written yet; choose .npz, .usda, .usdc, or a folder of OBJ (no extension)")
-    if not stage and kind not in (".npz", "") and not output.is_dir():
-        usage(f"{output}: shapes are written to .npz, .usda, .usdc, or a folder of OBJ (no extension)")
+    scenes = {".usd": usd, ".usda": usd, ".usdc": usd, ".glb": gltf, ".gltf": gltf}
+    if kind not in (*scenes, ".npz", "") and not output.is_dir():
+        usage(f"{output}: shapes are written to .npz, .usda, .usdc, .glb, .gltf, or a folder of OBJ (no extension)")
     require_folder(output)
     found = read_face(str(face))
     _refuse_broken(found, face)
     shut, said = _shut(found) if profile == "arkit" else (None, [])
     shapes, findings = profile_shapes(found, profile, shut)
-    if stage:
-        write_shape_set(found.scene, shapes, output)
+    if kind in scenes:
+        scenes[kind].write_shape_set(found.scene, shapes, output)
     else:
         write_shapes(shapes, found.scene, output)
     out = console()

@@ -79,11 +79,21 @@ def test_usd_plays_the_shapes(tmp_path: Path, extension: str) -> None:
     assert np.allclose(np.array(points) - before, made.deltas[made.names.index("viseme_aa")][order], rtol=0, atol=1e-5)
 
 
+def test_gltf_holds_the_shapes(tmp_path: Path) -> None:
+    out = tmp_path / "arkit.glb"
+    assert fba("export", "default", "-o", out, "--profile", "arkit").exit_code == Outcome.OK
+    face = read_face("default")
+    made, _ = profile_shapes(face, "arkit", strict(face))
+    found = read_shapes(out, read_scene(default_source()))
+    assert found.names == made.names
+    assert np.allclose(found.deltas, made.deltas, rtol=0, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
         (("default", "-o", "o.npz", "--profile", "talking"), Outcome.USAGE, "known: native, arkit, oculus, vrm"),
-        (("default", "-o", "o.glb", "--profile", "arkit"), Outcome.USAGE, "glTF is not written yet"),
+        (("default", "-o", "o.glb", "--profile", "arkit", "--stream", "demo"), Outcome.USAGE, "without animation"),
         (("default", "-o", "o.wrl", "--profile", "arkit"), Outcome.USAGE, "folder of OBJ"),
         (("default", "-o", "none/o.npz", "--profile", "arkit"), Outcome.BAD_INPUT, "there is no folder"),
     ],
