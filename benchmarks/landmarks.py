@@ -18,10 +18,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
+from typing import Any
 
 import numpy as np
 
 from cloning.detect import detect_points
+from cloning.detect.confidence import HALF, LOW
 from cloning.detect.xiang import LANDMARKS
 from cloning.prepare import PreparedFace, prepare
 from fba.arrays import Floats
@@ -89,6 +91,8 @@ def main() -> None:
             if row is not None:
                 rows.append(row)
                 print(line(row), flush=True)
+    for way in options.ways.split(","):
+        print(calibration([row for row in rows if row["way"] == way], way))
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1) + "\n")
 
@@ -164,7 +168,7 @@ def measure(known: Known, source: PreparedFace, way: str, sheets: Path | None) -
         save_png(landmark_sheet(scene, points, known.name), sheets / f"{known.name}_{way}.png")
     if known.truth is not None:
         off = errors(known.scene, found.points, known.truth, () if given is None else CLICKS)
-        row["errors"] = off
+        row["errors"], row["confidence"] = off, {key: found.points[key].confidence for key in off}
         far = [key for key, value in off.items() if value > WRONG]
         row["wrong"], row["unsaid"] = len(far), sum(found.points[key].confidence >= 0.5 for key in far)
     return row
@@ -176,6 +180,20 @@ def errors(scene: FaceScene, found: FeaturePoints, truth: FeaturePoints, without
     width = 0.5 * sum(np.linalg.norm(wanted[a] - wanted[b]) for a, b in (("3.7", "3.11"), ("3.8", "3.12")))
     counted = [key for key in at if key in wanted and key not in without and key not in INSIDE]
     return {key: float(np.linalg.norm(at[key] - wanted[key]) / width) for key in counted if key[:2] != "6."}
+
+
+def calibration(rows: Sequence[Mapping[str, Any]], way: str) -> str:
+    """What the confidence of a way is worth, over all points whose place is known."""
+    known = [row for row in rows if "errors" in row]
+    pairs = np.array([(row["confidence"][key], off) for row in known for key, off in row["errors"].items()])
+    pairs = pairs.reshape(-1, 2)
+    sure = pairs[:, 0] >= LOW
+    low, high = pairs[~sure], pairs[sure]
+    return (
+        f"{way}: of {len(low)} points with a confidence < 0.5 {int((low[:, 1] > HALF).sum())} are off by more than "
+        f"{HALF:g}; of {len(high)} others {int((high[:, 1] > HALF).sum())}, and "
+        f"{int((high[:, 1] > WRONG).sum())} by more than {WRONG:g}"
+    )
 
 
 def line(row: Mapping[str, object]) -> str:
