@@ -15,6 +15,9 @@ EYE_LINE, SEPARATION = 0.42, 0.22
 """Where a template without any hint goes, in heights of the picture: the eye line of a portrait, and how far its eyes
 are apart."""
 
+MARGIN = 0.3
+"""What a picture of points shows around them, in heights of the face."""
+
 DOT, LABEL = (255, 60, 40), (20, 60, 220)
 
 
@@ -28,11 +31,9 @@ def template_points(size: tuple[int, int], known: Places) -> dict[str, tuple[flo
         middle.
     """
     face = read_face("default")
-    skip = tuple(n for n in NOT_FACE if n not in ("3.5", "3.6"))
+    skip = set(NOT_FACE) - {"3.5", "3.6"}
     places = {
-        key: np.array([p[0], -p[1]])
-        for key, p in face.feature_points.positions(face.scene).items()
-        if not any(key == n or (n[-1] == "." and key.startswith(n)) for n in skip)
+        key: np.array([p[0], -p[1]]) for key, p in face.feature_points.positions(face.scene).items() if key not in skip
     }
     width, height = size
     shared = [name for name in known if name in places]
@@ -48,21 +49,26 @@ def template_points(size: tuple[int, int], known: Places) -> dict[str, tuple[flo
 
 
 def points_picture(pixels: list[UInt8], points: list[Places], height: int = 700) -> UInt8:
-    """Pictures side by side with their points and numbers, all of this height."""
+    """The faces of pictures side by side, all of this height, with their points and numbers."""
     font = ImageFont.load_default(size=11)
     drawn = []
     for rgb, places in zip(pixels, points, strict=True):
+        corner, rgb = _around(rgb, places)
         zoom = height / rgb.shape[0]
         image = Image.fromarray(rgb).resize((max(round(rgb.shape[1] * zoom), 1), height), Image.Resampling.LANCZOS)
         pen = ImageDraw.Draw(image)
         for name, place in places.items():
-            x, y = _place(place, zoom)
+            x, y = (np.array(place) - corner + 0.5) * zoom - 0.5
             pen.ellipse((x - 2, y - 2, x + 2, y + 2), fill=DOT)
             pen.text((x + 3, y - 6), name, fill=LABEL, font=font)
         drawn.append(np.asarray(image))
     return np.concatenate(drawn, axis=1)
 
 
-def _place(place: tuple[float, float], zoom: float) -> Floats:
-    scaled: Floats = (np.asarray(place) + 0.5) * zoom - 0.5
-    return scaled
+def _around(rgb: UInt8, places: Places) -> tuple[Floats, UInt8]:
+    """The part of a picture around its points, and its upper left pixel (x, y)."""
+    at = np.array(list(places.values()))
+    margin = MARGIN * float(np.ptp(at[:, 1]))
+    left, top = np.maximum(at.min(axis=0) - margin, 0).astype(int)
+    right, bottom = np.ceil(at.max(axis=0) + margin).astype(int) + 1
+    return np.array([left, top], np.float64), rgb[top:bottom, left:right]

@@ -22,6 +22,7 @@ from cloning.image.points import (
     refined,
     source_to_target,
     to_array,
+    turned,
 )
 from cloning.image.solve import PixelSystem
 from cloning.image.warp import Sampler, WarpMesh, label_pixels, mapped, ring_around, triangulate
@@ -64,6 +65,7 @@ class AnalogyResult:
     points : where the target's points are now.
     steps : of the iteration; 0 where the matrix is factored.
     teeth : True where the source's mouth was shown.
+    turned : how much the source's head turned between its pictures: see `cloning.image.points.turned`.
     """
 
     rgb: UInt8
@@ -72,6 +74,7 @@ class AnalogyResult:
     points: dict[str, tuple[float, float]]
     steps: int
     teeth: bool
+    turned: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +164,7 @@ class Analogy:
         pair = self._source_pair(warp, own, expression)
         steps = 0
         if self.method == "eri":
-            warped[0] *= 1.0 + warp.mask * (ratio_image(*pair, self._unit) - 1.0)
+            warped[0] *= 1.0 + warp.skin * warp.mask * (ratio_image(*pair, self._unit) - 1.0)
         else:
             change, steps = self._transfer(warped[0], *pair, warp.mask)
             warped[0] += warp.skin * change
@@ -174,7 +177,8 @@ class Analogy:
         rgb, luminance = self._picture.copy(), self._yuv[0].copy()
         rgb[rows, columns] = np.where(changed[rows, columns, None], to_rgb(warped), rgb[rows, columns])
         luminance[rows, columns] = warped[0]
-        return AnalogyResult(rgb, luminance, changed, dict(warp.moved), steps, shown)
+        head = turned(self._source, expression.points, self._names)
+        return AnalogyResult(rgb, luminance, changed, dict(warp.moved), steps, shown, head)
 
     def _moved(self, expression: Places) -> dict[str, tuple[float, float]]:
         return moved_points(self._source, expression, self._target, self._names)
@@ -201,7 +205,7 @@ class Analogy:
         labels = label_pixels(mesh, self._box)
         mask = np.where(self._domain & (labels >= 0), face_mask(moved, self._box), 0.0)
         skin = 1.0 - slit_mask(mesh, labels, moved, EYES)
-        return _Warp(mesh, moved, labels, mask * skin, skin)
+        return _Warp(mesh, moved, labels, mask, skin)
 
     def _warped_target(self, warp: _Warp) -> tuple[Floats, Bools]:
         """Planes of the warped target in the box, and which pixels the warp moved."""

@@ -12,8 +12,9 @@ INSET = 0.95
 """The mask's outline lies inside the points of the face's contour, by this factor towards its middle: neither the
 source's background nor its hair is copied onto the face."""
 
-FEATHER = 0.25
-"""Width of the mask's soft border, in eye separations: about the width of an eye's half."""
+FEATHER = 0.15
+"""Width of the mask's soft border, in eye separations: a quarter of an eye's width
+on either side of its middle."""
 
 RIM_FEATHER = 0.02
 """Softness of the border between lips and mouth, or lids and eye, in eye separations."""

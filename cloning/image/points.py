@@ -41,9 +41,20 @@ CONTOURS = (
 BETWEEN = 2
 """Points put on a contour between two neighbours: eight points of a lip become a curve."""
 
-NOT_FACE = ("6.", "7.", "10.", "11.4", "11.5", "11.6", "9.8", "9.9", "9.10", "9.11", "3.5", "3.6", "2.10")
-"""Tongue, neck, ears, skull and teeth, which are no face seen from the front; pupils and the boss of the chin, which
-have no contour that ties them to their surroundings."""
+MOVING = ("2", "3", "4", "5", "8", "9")
+"""Groups of points that an expression moves; all others (hair line, outline) sit on the skull. Where they seem to
+move the head has turned, and the target's shall not."""
+
+NOT_FACE = (
+    *("6.1", "6.2", "6.3", "6.4", "7.1", "7.2", "10.1", "10.2", "10.3", "10.4", "10.5", "10.6", "11.4", "11.5", "11.6"),
+    *("9.8", "9.9", "9.10", "9.11", "3.5", "3.6", "2.10"),
+)
+"""Tongue, neck, free parts of the ears, skull and teeth, which are no face seen from the front; pupils and the boss of
+the chin, which no contour ties to their surroundings."""
+
+SAME_CAMERA = 0.03
+"""Where the alignment of the source's two pictures would move no point by more than this, in eye separations, they lie
+as they are: corners of the eyes and nose themselves move by up to 0.02 with the expressions of the shipped source."""
 
 
 def face_points(*pictures: Places) -> list[str]:
@@ -64,7 +75,7 @@ def face_points(*pictures: Places) -> list[str]:
     for places in pictures:
         if distance(places, "3.7", "3.12") < 8.0 or distance(places, "8.3", "8.4") < 4.0:
             raise LandmarkError("the eyes are less than 8 or the corners of the mouth less than 4 pixels apart")
-    return [n for n in common if not any(n == x or (x[-1] == "." and n.startswith(x)) for x in NOT_FACE)]
+    return [name for name in common if name not in NOT_FACE]
 
 
 def distance(places: Places, one: str, other: str) -> float:
@@ -91,14 +102,30 @@ def moved_points(
     is left are motions in the target's pixels. As in facial animation parameters, they are scaled by what the target's
     face is like: width of the mouth, separation of mouth and nose, opening of the eye.
     """
-    own = fit_similarity_2d(*(to_array(p, [n for n in RIGID if n in names]) for p in (expression, source)))
     across = source_to_target(source, target, names)
-    aligned = own.apply(to_array(expression, names))
-    motions = across.turn(aligned - to_array(source, names))
+    here, there = to_array(expression, names), to_array(source, names)
+    aligned = _expression_to_source(source, expression, names).apply(here)
+    if np.linalg.norm(aligned - here, axis=1).max() < SAME_CAMERA * eye_separation(source):
+        aligned = here
+    motions = across.turn(aligned - there)
     axis = _upright(target)
+    motions[[name.partition(".")[0] not in MOVING for name in names]] = 0.0
     local = motions @ axis.T * _ratios(source, target, across.scale, names)
     places = to_array(target, names) + local @ axis
     return {name: (float(x), float(y)) for name, (x, y) in zip(names, places, strict=True)}
+
+
+def _expression_to_source(source: Places, expression: Places, names: list[str]) -> Similarity2D:
+    still = [name for name in RIGID if name in names]
+    return fit_similarity_2d(to_array(expression, still), to_array(source, still))
+
+
+def turned(source: Places, expression: Places, names: list[str]) -> float:
+    """How badly rotation, scale and translation explain the points that hardly move, in eye separations (RMS)."""
+    still = [name for name in RIGID if name in names]
+    laid = _expression_to_source(source, expression, names).apply(to_array(expression, still))
+    off = laid - to_array(source, still)
+    return float(np.sqrt((off**2).sum(axis=1).mean())) / eye_separation(source)
 
 
 def source_to_target(source: Places, target: Places, names: list[str]) -> Similarity2D:
