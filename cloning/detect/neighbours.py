@@ -1,7 +1,7 @@
 """Points without an edge or tip of their own, by sharp neighbours: as far from them, in eye widths, as on the source.
 
-Measured on nine heads of two kits, placed by two hands, each distance below differs from the source's by 0.13 eye widths
-at most, most by half of that. A fitted surface slides farther along smooth skin.
+Measured on nine heads of two kits, placed by two hands, each distance below differs from the source's by 0.13 eye
+widths at most, most by half of that. A fitted surface slides farther along smooth skin.
 """
 
 from __future__ import annotations
