@@ -28,6 +28,9 @@ DERIVED = ("3.5", "3.6", "7.1", "7.2")
 OPTIONAL = ("7.1", "7.2", "11.4", "11.5", "11.6", "8.9", "8.10", *(f"9.{k}" for k in (4, 5, 6, 7, 12, 13, 14)))
 """Not among the points that Facial Motion Cloning asks for; they refine the alignment where they are given."""
 
+EXCHANGED = 0.8
+"""An inner lip point lies on the other lip where that lip's outer point is nearer than this share of its own's."""
+
 FIGURE = 8.0
 """What reaches farther than this below the chin, in eye separations, is more than a bust: half a metre of a man."""
 
@@ -88,11 +91,27 @@ def prepare(
             f"the {who} '{scene.name}': only {len(skin.points)} feature points lie on the skin; "
             "give them as a face and barycentric coordinates, or as a vertex"
         )
+    _check_lips(skin, who)
     labels = label(skin)
     parts = tell_parts(scene, skin, fapu.es0)
     about = [parts.finding(scene.name), *_whole_figure(scene, skin, fapu.es0)] if who == "target" else []
     found = (*findings, *turned, *about, *missing, *derived, *_sealed(labels, scene.name))
     return PreparedFace(scene, points, fapu, skin, labels, found, parts)
+
+
+def _check_lips(skin: Surface, who: str) -> None:
+    """Refuse inner lip points on each other's lip: lips that touch cannot be told by height, but along the skin."""
+    if not all(i in skin.points for i in ("2.2", "2.3", "8.1", "8.2")):
+        return
+    rows = skin.point_matrix(["2.2", "2.3"])
+    reach = 2.0 * float(np.linalg.norm(skin.positions["8.1"] - skin.positions["8.2"]))
+    away = (rows @ np.minimum(skin.distances(["8.1", "8.2"], reach), reach).T).T
+    (upper, wrong_upper), (wrong_lower, lower) = away
+    if wrong_upper < EXCHANGED * upper and wrong_lower < EXCHANGED * lower:
+        raise LandmarkError(
+            f"{who}: feature point 2.2 lies on the lower lip and 2.3 on the upper one (they are nearer along the skin "
+            "to 8.2 and to 8.1); exchange them"
+        )
 
 
 def require_finite(scene: FaceScene) -> None:

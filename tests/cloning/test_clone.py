@@ -17,7 +17,7 @@ from fat.conformance import conformance
 from fat.evaluate import Player
 from fba import FaceScene, FeaturePoint, FeaturePoints, Frame, Role, ShapeSet
 from fba.arrays import Floats
-from fba.errors import CloningError
+from fba.errors import CloningError, LandmarkError
 from formats import read_scene
 from samples import sample
 
@@ -245,6 +245,13 @@ def test_missing_feature_points(source: AnimatableFace, wide: tuple[FaceScene, F
     face, report = clone_with_report(source, scene, fewer, faps=FEW)
     assert {"derived-point", "missing-points"} <= {f.code for f in report.findings}
     assert face.feature_points["7.1"].source == "derived"
+
+
+def test_exchanged_lips_are_refused(source: AnimatableFace, wide: tuple[FaceScene, FeaturePoints]) -> None:
+    scene, points = wide
+    exchanged = points.with_points({"2.2": points["2.3"], "2.3": points["2.2"]})
+    with pytest.raises(LandmarkError, match=r"2\.2 lies on the lower lip"):
+        clone_with_report(source, scene, exchanged, faps=FEW)
 
 
 def test_an_animatable_target_brings_its_own_points(source: AnimatableFace) -> None:
