@@ -91,6 +91,9 @@ WING_SLICES = 0.12
 CREASE = 0.03
 """A crease is at least this deep, in eye separations; measured 0.06 to 0.10."""
 
+FOLD = 0.01
+"""Depth of the fold under the lip from which on it tells where the chin begins, in eye separations; beards fill it."""
+
 FLAT = 0.01
 """A profile is flat over the heights at which it lies this little behind its extreme point, in eye separations."""
 
@@ -145,8 +148,9 @@ def _profile(skin: Surface, guess: Mapping[str, Floats]) -> dict[str, Floats]:
     # The chin boss is half way between the fold under the lip and the chin: a receding chin has no foremost place.
     heights = np.linspace(float(found.get("2.1", guess["2.1"])[1]), float(guess["8.2"][1]), 200)
     depths = cut.profile(heights)
-    if not np.isnan(depths).any():
-        height = 0.5 * (float(heights[deepest(heights, depths)[0]]) + float(heights[0]))
+    fold, behind = deepest(heights, depths) if not np.isnan(depths).any() else (0, 0.0)
+    if behind > FOLD:
+        height = 0.5 * float(heights[fold] + heights[0])
         found["2.10"] = np.array([middle, height, float(np.interp(height, heights, depths))])
     return found
 
