@@ -2,7 +2,7 @@
 
 After Noh and Neumann (2001), the baseline that vertex tents are compared with. The source is morphed onto the target by
 radial basis functions and projected to its skin along the rays of a cylinder; each source vertex's motion is turned
-from its frame on the source to its frame on the morphed copy, and scaled by the size of its neighbourhood there; each
+from its frame on the source to its frame on the morphed one, and scaled by the size of its neighbourhood there; each
 target vertex moves like its place on the copy, those on the line where the lips meet like the same lip of the source.
 
 Published mode starts from rules of thumb, and skin behind other skin (mouths, sockets) takes no part. The default mode
@@ -46,19 +46,18 @@ def build_transfer(source: PreparedFace, target: PreparedFace, as_published: boo
     """Prepare Expression Cloning between two faces."""
     mine, yours = source.skin, target.skin
     centers, goals = _points(mine, yours, as_published)
-    copy = morph(mine.vertices, centers, goals)
+    morphed = morph(mine.vertices, centers, goals)
     if as_published:
         around = cylinder(yours.positions)
         outer = _outermost(mine)
-        copy = np.where(outer[:, None], _projected(copy, yours, around), copy)
-        skin_map = carrying_map(
-            yours, _on_cylinder(copy, mine.triangles[outer[mine.triangles].all(axis=1)], yours, around)
-        )
+        copy = np.where(outer[:, None], _projected(morphed, yours, around), morphed)
+        triangles = mine.triangles[outer[mine.triangles].all(axis=1)]
+        skin_map = carrying_map(yours, _on_cylinder(copy, triangles, yours, around))
     else:
         labels = source.labels.values, target.labels.values
-        places = correspond(copy, mine.triangles, yours, labels=labels)
+        places = correspond(morphed, mine.triangles, yours, labels=labels)
         skin_map = carrying_map(yours, places, without=target.labels.between)
-    maps = motion_maps(mine, copy) * (target.fapu.es0 / source.fapu.es0)
+    maps = motion_maps(mine, morphed) * (target.fapu.es0 / source.fapu.es0)
     sealed = 1 in source.labels.sealed or 1 in target.labels.sealed
     line, on_line = _lip_line(mine, yours, () if sealed else CONTOURS[:2])
     return ClonedTransfer(

@@ -56,7 +56,7 @@ class MeshImage:
         first = np.floor(at).astype(int)
         share = at - first
         column, row = np.rint(at).astype(int).T
-        inside = (row >= 0) & (row < rows)
+        inside = np.abs(at[:, 1] - 0.5 * (rows - 1)) <= 0.5 * rows + 1e-9
         nearest = np.where(inside, self.depth[np.clip(row, 0, rows - 1), column % columns], np.inf)
         total, places = np.zeros(len(plane)), np.zeros((len(plane), 3))
         for i in (0, 1):
