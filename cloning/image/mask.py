@@ -8,13 +8,17 @@ from cloning.image.points import Places, Slits, eye_separation, rim_names, to_ar
 from cloning.image.warp import WarpMesh
 from fba.arrays import Bools, Floats, Ints
 
-INSET = 0.95
+INSET = 0.97
 """The mask's outline lies inside the points of the face's contour, by this factor towards its middle: neither the
 source's background nor its hair is copied onto the face."""
 
 FEATHER = 0.15
-"""Width of the mask's soft border, in eye separations: a quarter of an eye's width
-on either side of its middle."""
+"""Width of the mask's soft border, in eye separations: about a third of an eye. As it blends what is asked, not the
+solution, it may be narrow without showing."""
+
+TEMPLE = 0.25
+"""The temples lie so far beyond the outer ends of the brows, in eye separations: no feature point marks them, and
+without them the mask's border would run through the brows."""
 
 RIM_FEATHER = 0.02
 """Softness of the border between lips and mouth, or lids and eye, in eye separations."""
@@ -25,6 +29,10 @@ def face_mask(moved: Places, box: tuple[slice, slice]) -> Floats:
     from scipy.spatial import ConvexHull
 
     points = to_array(moved, list(moved))
+    if "4.5" in moved and "4.6" in moved:
+        ends = to_array(moved, ["4.5", "4.6"])
+        across = (ends[0] - ends[1]) / max(float(np.linalg.norm(ends[0] - ends[1])), 1e-12)
+        points = np.concatenate([points, ends + TEMPLE * eye_separation(moved) * np.stack([across, -across])])
     corners = points[ConvexHull(points).vertices]
     middle = corners.mean(axis=0)
     corners = middle + INSET * (corners - middle)
