@@ -10,6 +10,7 @@ from studio.cli.analogy import analogy
 from studio.cli.author import author
 from studio.cli.check import check
 from studio.cli.clone import clone
+from studio.cli.convert import convert
 from studio.cli.demo import demo
 from studio.cli.doctor import doctor
 from studio.cli.export import export
@@ -27,7 +28,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for verb in (demo, inspect, landmarks, clone, author, export, play, check, analogy, doctor):
+for verb in (demo, inspect, landmarks, clone, author, export, convert, play, check, analogy, doctor):
     app.command()(guarded(verb))
 
 

@@ -10,6 +10,18 @@ import typer
 FacePath = Annotated[Path, typer.Argument(help="A face file; the word 'default' names the shipped source face.")]
 OutPath = Annotated[Path, typer.Option("--output", "-o", help="Where to write; the extension chooses the format.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
+StreamPath = Annotated[
+    Path,
+    typer.Argument(
+        help="A stream: .fap, .fba, ARKit curves (.csv), Rhubarb cues (.json, .tsv); 'demo' names the shipped one."
+    ),
+]
+StreamRate = Annotated[
+    float | None,
+    typer.Option(
+        "--rate", help="Frames a second of mouth cues (default 50) or of curves (default: as their time codes tell)."
+    ),
+]
 
 OpenJaw = Annotated[
     Literal["strict", "practical"] | None,

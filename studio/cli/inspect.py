@@ -12,16 +12,17 @@ from studio.cli.outcome import Outcome
 
 
 def inspect(
-    file: Annotated[Path, typer.Argument(help="A face or a .fap stream; 'default' names the shipped source.")],
+    file: Annotated[Path, typer.Argument(help="A face or a stream; 'default' names the shipped source.")],
     landmarks: Annotated[
         Path | None, typer.Option(help="Feature points; default: NAME.fps.json beside the file.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Say what a file holds, what it can play, and what is wrong with it."""
+    from formats.streams import STREAM_FORMATS
     from studio.cli.console import console, findings_json, print_findings, print_json
 
-    if file.suffix.lower() == ".fap":
+    if any(file.suffix.lower() in kind.extensions for kind in STREAM_FORMATS):
         about, findings = _stream(file)
     else:
         about, findings = _face(file, landmarks)
@@ -36,10 +37,10 @@ def inspect(
 
 
 def _stream(file: Path) -> tuple[dict[str, Any], list[Any]]:
-    from formats.fap import read_fap
+    from formats.streams import read_stream
     from studio.describe import describe_stream
 
-    stream, findings = read_fap(file)
+    stream, findings = read_stream(file)
     return {"file": str(file), "kind": "FAP stream", **describe_stream(stream)}, findings
 
 

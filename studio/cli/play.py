@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from studio.cli.arguments import FacePath, OutPath
+from studio.cli.arguments import FacePath, OutPath, StreamPath, StreamRate
 from studio.cli.outcome import usage
 
 
 def play(
     face: FacePath,
-    stream: Annotated[Path, typer.Argument(help="A .fap stream; 'demo' names the shipped one.")],
+    stream: StreamPath,
     output: OutPath,
+    rate: StreamRate = None,
     size: Annotated[int, typer.Option(min=32, max=4096, help="Height and width of the picture in pixels.")] = 360,
     hold: Annotated[
         bool, typer.Option("--hold", help="A FAP that a frame leaves out keeps its last value instead of 0.")
@@ -26,14 +26,14 @@ def play(
         ),
     ] = "all",
 ) -> None:
-    """Play a FAP stream on a face: into .gif, .mp4, a folder of .png, or .npz (vertices of every frame)."""
+    """Play a stream on a face: into .gif, .mp4, a folder of .png, or .npz (vertices of every frame)."""
+    from fat.open_jaw import open_jaw_mode
     from fba.errors import UnknownFormatError
     from formats import read_face
-    from formats.fap import read_fap
-    from samples import sample
     from studio.cli.arguments import parse_rules
     from studio.cli.console import console, print_findings, progress
     from studio.playback import draw_frames, write_vertices
+    from studio.streams import open_stream
 
     try:
         chosen = parse_rules(rules)
@@ -43,8 +43,7 @@ def play(
     if suffix not in (".gif", ".mp4", ".npz", ""):
         raise UnknownFormatError(f"{output}: choose .gif, .mp4, .npz, or a folder (no extension) for .png frames")
     animatable = read_face(str(face))
-    path = sample("streams/demo.fap") if str(stream) == "demo" else stream
-    frames, findings = read_fap(path)
+    frames, findings = open_stream(stream, rate, strict_jaw=open_jaw_mode(animatable) == "strict")
     if hold:
         frames = frames.held()
     out = console()
