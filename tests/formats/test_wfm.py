@@ -42,6 +42,42 @@ def written(tmp_path: Path, text: str) -> Path:
     return path
 
 
+MESH = TEXT.replace("# ANIMATION", "# FACE LIST:\n1\n0 1 2\n\n# ANIMATION", 1)
+
+
+def test_the_neutral_mesh(tmp_path: Path) -> None:
+    mesh = read_scene(written(tmp_path, MESH)).shapes[0].mesh
+    assert np.array_equal(mesh.vertices, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    assert [list(mesh.face(f)) for f in range(mesh.face_count)] == [[0, 1, 2]]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("0 1 2\n", "0 1 3\n", r"line 9.*\(0 to 2\)"),
+        ("0 1 2\n", "0 1\n", "line 9.*three or more"),
+        ("1 0 0\n", "1 0\n", "line 4.*three finite coordinates"),
+        ("1 0 0\n", "1 inf 0\n", "line 4.*three finite coordinates"),
+        ("# FACE LIST:\n1", "# FACE LIST:\nmany", "line 8.*the number of polygons"),
+    ],
+)
+def test_damaged_meshes_name_the_line(tmp_path: Path, old: str, new: str, said: str) -> None:
+    with pytest.raises(TextSyntaxError, match=said):
+        read_scene(written(tmp_path, MESH.replace(old, new, 1)))
+
+
+def test_a_mesh_without_polygons_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputFileError, match="FACE LIST"):
+        read_scene(written(tmp_path, TEXT))
+
+
+def test_candide_reads_like_its_obj(shared: Path) -> None:
+    folder = shared / "faces" / "candide3"
+    mine, other = read_scene(folder / "candide3.wfm"), read_scene(folder / "candide3.obj")
+    assert np.allclose(mine.shapes[0].mesh.vertices, other.shapes[0].mesh.vertices, atol=1e-6)
+    assert np.array_equal(mine.shapes[0].mesh.indices, other.shapes[0].mesh.indices)
+
+
 def test_units_with_their_names(tmp_path: Path) -> None:
     (jaw, opened), (other, twice) = read_animation_units(written(tmp_path, TEXT), 3)
     assert (jaw, other) == ("Jaw drop", "Twice named")
