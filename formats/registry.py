@@ -12,6 +12,7 @@ from fat.face import AnimatableFace
 from fba.errors import FbaError, LandmarkError, UnknownFormatError, UnsupportedFeatureError
 from fba.scene import FaceScene
 from fba.stream import FapStream
+from formats.textures import place_textures
 
 
 class FormatModule(Protocol):
@@ -32,6 +33,7 @@ class Format:
 
     module : import path of its FormatModule.
     carries_tables : a face written to it reads back with its Facial Animation Tables.
+    names_images : its files name the images of materials, which then lie beside them.
     carries_streams : its writer takes a FAP stream as third argument and makes it the file's animation.
     """
 
@@ -41,6 +43,7 @@ class Format:
     reads: bool = True
     writes: bool = True
     carries_tables: bool = False
+    names_images: bool = False
     carries_streams: bool = False
 
 
@@ -122,6 +125,8 @@ def read_face(path: str | Path) -> AnimatableFace:
 def write(face: FaceScene | AnimatableFace, path: str | Path, stream: FapStream | None = None) -> None:
     """Write a face; the extension chooses the format. The file is written whole or not at all.
 
+    Images that materials name are put beside it, where the format does not hold them and they are not there yet.
+
     stream : becomes the file's animation.
 
     Raises
@@ -131,12 +136,12 @@ def write(face: FaceScene | AnimatableFace, path: str | Path, stream: FapStream 
     """
     path = Path(path)
     entry = format_of(path, writing=True)
-    if stream is None:
-        _load(entry, "write")(face, path)
-        return
-    if not entry.carries_streams:
+    scene = face.scene if isinstance(face, AnimatableFace) else face
+    if stream is not None and not entry.carries_streams:
         known = ", ".join(e for f in _FORMATS if f.carries_streams for e in f.extensions)
         raise UnsupportedFeatureError(f"{path}: {entry.name} is written without animation; choose one of {known}")
-    if not isinstance(face, AnimatableFace):
-        raise UnsupportedFeatureError(f"'{face.name}' has no Facial Animation Tables, so a FAP stream cannot move it")
-    _load(entry, "write")(face, path, stream)
+    if stream is not None and scene is face:
+        raise UnsupportedFeatureError(f"'{scene.name}' has no Facial Animation Tables, so a FAP stream cannot move it")
+    _load(entry, "write")(*((face, path) if stream is None else (face, path, stream)))
+    if entry.names_images:
+        place_textures(scene, path.parent)

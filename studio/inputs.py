@@ -34,12 +34,17 @@ def missing_textures(scene: FaceScene, folder: Path) -> list[str]:
 
 
 def left_behind(scene: FaceScene, read_from: Path, written_to: Path) -> list[Finding]:
-    """Textures that lie beside the file that was read, but not beside the one that was written."""
-    gone = set(missing_textures(scene, read_from.parent))
-    lost = [name for name in missing_textures(scene, written_to.parent) if name not in gone]
+    """Textures that lie beside the file that was read, but neither beside nor in the one that was written."""
+    gone = set(missing_textures(scene, read_from.parent)) - set(scene.images)
+    if written_to.suffix.lower() in (".glb", ".gltf"):
+        from formats.gltf.materials import left_out
+
+        lost, advice = left_out(scene), "make a PNG or JPEG, which glTF can hold, of the texture {}"
+    else:
+        lost = missing_textures(scene, written_to.parent)
+        advice = "copy the texture {} from " + str(read_from.parent) + " to the new folder"
     return [
-        Finding("warning", "texture-left-behind", f"copy the texture {name} from {read_from.parent} to the new folder")
-        for name in lost
+        Finding("warning", "texture-left-behind", advice.replace("{}", name, 1)) for name in lost if name not in gone
     ]
 
 

@@ -8,7 +8,7 @@ from fba.mesh import Material
 from fba.scene import FaceScene
 from formats.gltf.buffers import Buffer, Json
 from formats.gltf.colors import to_linear
-from formats.textures import texture_bytes
+from formats.textures import texture_bytes, texture_names
 
 _PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff"
 _REPEAT = 10497
@@ -25,20 +25,23 @@ class Materials:
         self.images: list[Json] = []
         self._buffer = buffer
         self._scene = scene
-        self._numbers: dict[Material, int] = {}
+        self._numbers: dict[tuple[Material, bool], int] = {}
         self._textures: dict[str, tuple[int, bool] | None] = {}
 
-    def numbers(self, materials: tuple[Material, ...]) -> list[int]:
-        """Number of each of a shape's materials in the file."""
-        for material in materials:
-            if material not in self._numbers:
-                self._numbers[material] = len(self.entries)
-                self.entries.append(self._entry(material))
-        return [self._numbers[material] for material in materials]
+    def number(self, material: Material, mapped: bool) -> int:
+        """Number of a material in the file.
 
-    def _entry(self, material: Material) -> Json:
+        mapped : it lies on a surface with texture coordinates; without them it cannot have its texture.
+        """
+        key = (material, mapped and material.texture is not None)
+        if key not in self._numbers:
+            self._numbers[key] = len(self.entries)
+            self.entries.append(self._entry(*key))
+        return self._numbers[key]
+
+    def _entry(self, material: Material, textured: bool) -> Json:
         opacity = 1.0 - min(max(material.transparency, 0.0), 1.0)
-        texture = self._texture(material.texture)
+        texture = self._texture(material.texture) if textured else None
         color = to_linear(material.diffuse) if texture is None else [1.0, 1.0, 1.0]
         surface: Json = {
             "baseColorFactor": [*color, opacity],
@@ -80,6 +83,12 @@ class Materials:
             document["samplers"] = [{"magFilter": _LINEAR, "minFilter": _LINEAR_MIPMAP_LINEAR, **sides}]
             document["textures"] = [{"sampler": 0, "source": k} for k in range(len(self.images))]
             document["images"] = self.images
+
+
+def left_out(scene: FaceScene) -> list[str]:
+    """Images that the materials name, but that do not get into a glTF file: other kinds, and what cannot be had."""
+    found = [(name, texture_bytes(scene, name)) for name in texture_names(scene)]
+    return [name for name, data in found if data is None or image_type(data) is None]
 
 
 def image_type(data: bytes) -> str | None:

@@ -17,6 +17,7 @@ from fba.arrays import Bools, Floats, Floats32, Ints
 from fba.mesh import PolyMesh
 from fba.scene import Shape
 from formats.gltf.buffers import Buffer, Json, to_single
+from formats.gltf.materials import Materials
 from formats.gltf.targets import Target
 from formats.usd.normals import SmoothNormals
 
@@ -107,18 +108,14 @@ def _unit(normals: Floats) -> Floats:
     return unit
 
 
-def write_mesh(
-    buffer: Buffer, shape: Shape, targets: Sequence[Target], materials: Sequence[int]
-) -> tuple[Json | None, list[Primitive]]:
-    """A glTF mesh with morph targets, and the primitives that it is made of; None without polygons.
-
-    materials : number of each of the shape's materials in the file.
-    """
+def write_mesh(buffer: Buffer, shape: Shape, targets: Sequence[Target], materials: Materials) -> Json | None:
+    """A glTF mesh with morph targets; None without polygons."""
+    to_single(shape.mesh.vertices)  # Refused here, before anything is computed with them.
     smooth = SmoothNormals(shape.mesh)
     primitives = split(shape, smooth.rest)
     if not primitives:
-        return None, []
-    entries = [_write_primitive(buffer, shape.mesh, p, materials) for p in primitives]
+        return None
+    entries = [_write_primitive(buffer, shape, p, materials) for p in primitives]
     for target in targets:
         index, offsets = target.index, target.offsets
         turned = to_single(smooth.offsets(index, offsets))
@@ -134,11 +131,11 @@ def write_mesh(
     if targets:
         mesh["weights"] = [0.0] * len(targets)
         mesh["extras"] = {"targetNames": [t.name for t in targets]}
-    return mesh, primitives
+    return mesh
 
 
-def _write_primitive(buffer: Buffer, mesh: PolyMesh, primitive: Primitive, materials: Sequence[int]) -> Json:
-    points: Floats32 = to_single(mesh.vertices[primitive.vertices])
+def _write_primitive(buffer: Buffer, shape: Shape, primitive: Primitive, materials: Materials) -> Json:
+    points: Floats32 = to_single(shape.mesh.vertices[primitive.vertices])
     attributes: dict[str, Any] = {
         "POSITION": buffer.attribute(points, bounds=True),
         "NORMAL": buffer.attribute(to_single(primitive.normals)),
@@ -148,5 +145,5 @@ def _write_primitive(buffer: Buffer, mesh: PolyMesh, primitive: Primitive, mater
         attributes["TEXCOORD_0"] = buffer.attribute(to_single(primitive.texcoords))
     entry: Json = {"attributes": attributes, "indices": buffer.indices(primitive.triangles.ravel())}
     if primitive.material >= 0:
-        entry["material"] = materials[primitive.material]
+        entry["material"] = materials.number(shape.materials[primitive.material], primitive.texcoords is not None)
     return entry

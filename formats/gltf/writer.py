@@ -50,8 +50,7 @@ class Draft:
         self.own: Json = {"format": FORMAT, "scene": scene_json(scene, self._pack)}
 
     def _mesh(self, shape: Shape) -> int | None:
-        numbers = self._materials.numbers(shape.materials)
-        mesh, _ = write_mesh(self.buffer, shape, self._targets.get(shape.name, ()), numbers)
+        mesh = write_mesh(self.buffer, shape, self._targets.get(shape.name, ()), self._materials)
         if mesh is None:
             return None
         self._meshes.append(mesh)

@@ -88,6 +88,7 @@ def _export_profile(face: Path, output: Path, profile: Profile) -> None:
     from formats import gltf, read_face, usd
     from formats.files import require_folder
     from formats.shapes import write_shapes
+    from formats.textures import place_textures
     from studio.cli.console import console, print_findings
     from studio.inputs import left_behind
 
@@ -104,6 +105,8 @@ def _export_profile(face: Path, output: Path, profile: Profile) -> None:
         scenes[kind].write_shape_set(found.scene, shapes, output)
     else:
         write_shapes(shapes, found.scene, output)
+    if scenes.get(kind) is not gltf and kind != ".npz":
+        place_textures(found.scene, output if kind not in scenes else output.parent)
     out = console()
     print_findings([*findings, *said, *left_behind(found.scene, face, output)], out)
     out.print(f"{output}: {len(shapes.names)} shapes of the profile '{profile}' for {len(shapes.neutral)} vertices")

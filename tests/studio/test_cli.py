@@ -491,7 +491,7 @@ def test_a_damaged_face_is_not_exported(cloned: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "o.wrl").exists()
 
 
-def test_textures_that_do_not_come_along_are_named(tmp_path: Path) -> None:
+def test_textures_come_along_or_are_named(tmp_path: Path) -> None:
     head = tmp_path / "head.wrl"
     head.write_text(
         '#VRML V2.0 utf8\nShape { appearance Appearance { texture ImageTexture { url "skin.png" } } geometry '
@@ -502,7 +502,11 @@ def test_textures_that_do_not_come_along_are_named(tmp_path: Path) -> None:
     assert "is not there" not in fba("inspect", head).stdout
     (tmp_path / "new").mkdir()
     assert "copy the texture skin.png" in fba("export", head, "-o", tmp_path / "new" / "head.usda").stdout
-    assert "copy" not in fba("export", head, "-o", tmp_path / "head.usda").stdout
+    assert "PNG or JPEG" in fba("export", head, "-o", tmp_path / "new" / "head.glb").stdout
+    (tmp_path / "skin.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    for name in ("new/head.usda", "new/head.glb", "head.usda"):
+        assert "warning" not in fba("export", head, "-o", tmp_path / name).stdout
+    assert (tmp_path / "new" / "skin.png").read_bytes() == (tmp_path / "skin.png").read_bytes()
 
 
 def test_the_word_default_names_the_shipped_source() -> None:
