@@ -4,8 +4,8 @@
                                [--write]
 
 A face in which no face is found is a row too, and a second one with some given points (tests/data/NAME.fps.json).
-Each face has a process of its own, so that its memory can be told. --write puts the table into docs/faces.md and the
-pictures beside it.
+Each face has a process of its own, so that its memory can be told. --sheets draws every face; --write puts the table into docs/faces.md
+and beside it the pictures of those faces whose licence lets anybody show them.
 """
 
 from __future__ import annotations
@@ -74,6 +74,18 @@ DOT = 2
 COLORS = 200
 """Of a written picture: few enough for a small file."""
 
+SHOWN = (
+    *SHIPPED,
+    "makehuman",
+    "phenotype_a_dec",
+    "phenotype_b_dec",
+    "soma",
+    "ict-facekit",
+    "mediapipe-canonical",
+    "lee-perry-smith",
+)
+"""CC0, Apache-2.0, MIT, and CC BY (named in the document): these may be shown by anybody."""
+
 IN_CONTACT = 0.01
 """MNS; lips that part by less in the source stay in contact."""
 EARS = (65, 66, 67, 68)
@@ -124,13 +136,14 @@ def main() -> None:
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
     names = [n for n in options.only.split(",") if n]
-    sheets = DOCS.parent / "images" / "faces" if options.write else options.sheets
+    shown = DOCS.parent / "images" / "faces" if options.write else None
     rows = []
     print(HEADING)
     with tempfile.TemporaryDirectory() as folder:
         for case in cases(options.faces, Path(folder), names):
             with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as own:
-                row = own.submit(run, case, options.backend, sheets).result()
+                drawn = [f for f in (options.sheets, shown if case.name in SHOWN else None) if f is not None]
+                row = own.submit(run, case, options.backend, drawn).result()
             rows.append(row)
             print(line(row), flush=True)
     if options.json:
@@ -177,7 +190,7 @@ def _free(scene: FaceScene, points: FeaturePoints) -> FeaturePoints:
     return FeaturePoints({key: FeaturePoint.free(place) for key, place in points.positions(scene).items()})
 
 
-def run(case: Case, backend: str, sheets: Path | None) -> Row:
+def run(case: Case, backend: str, sheets: Sequence[Path]) -> Row:
     """Clone onto one face, measure and draw it."""
     source = read_face("default")
     try:
@@ -194,10 +207,11 @@ def run(case: Case, backend: str, sheets: Path | None) -> Row:
         return replace(row, refused=_reason(error), seconds=process_time() - start)
     row = replace(row, seconds=process_time() - start, megabytes=_peak_megabytes())
     row = _measured(row, case, scene, source, face, report)
-    if sheets is not None:
-        sheets.mkdir(parents=True, exist_ok=True)
+    if sheets:
         picture = sheet(face, case).quantize(COLORS, dither=Image.Dither.NONE)
-        save_png(picture, sheets / f"{re.sub(r'[^a-z0-9]+', '_', case.name.lower()).strip('_')}.png")
+        for folder in sheets:
+            folder.mkdir(parents=True, exist_ok=True)
+            save_png(picture, folder / f"{re.sub(r'[^a-z0-9]+', '_', case.name.lower()).strip('_')}.png")
     return row
 
 
