@@ -2,12 +2,12 @@
 
 Noh and Neumann find a first set of points by heuristic rules on a face that looks along z: the nose is what sticks out
 most, the mouth lies between two bulges below it, and so on. The rules here go by the outline of the middle of the face
-and by three level cuts. They know no feature points; lengths are in eye separations.
+and by level cuts. They know no feature points; lengths are in eye separations.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -57,10 +57,10 @@ def rule_points(skin: Surface) -> dict[str, Floats]:
     found |= _outline(middle, tip)
     level = Slicer(skin, low, high, axis=1)
     found |= _sides(head, tip)
-    found |= _pair("nose wing", level.at(float(tip[1])), tip, deepest)
+    found |= _pair("nose wing", _cuts(level, tip), tip, deepest)
     for name, of, rule in (("mouth corner", "mouth", _fold), ("eye corner", "nose bridge", deepest)):
         if of in found:
-            found |= _pair(name, level.at(float(found[of][1])), found[of], rule)
+            found |= _pair(name, _cuts(level, found[of]), found[of], rule)
     return found
 
 
@@ -110,17 +110,22 @@ def _sides(head: Floats, tip: Floats) -> dict[str, Floats]:
 
 
 def _pair(
-    name: str, cut: Slice, middle: Floats, rule: Callable[[Floats, Floats], tuple[int, float]]
+    name: str, cuts: Sequence[Slice], middle: Floats, rule: Callable[[Floats, Floats], tuple[int, float]]
 ) -> dict[str, Floats]:
-    """Where a rule finds something on a level cut, to the left and to the right of its middle."""
+    """Where a rule finds something on level cuts, the foremost of them, to the left and right of their middle."""
     found: dict[str, Floats] = {}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         along = np.arange(0.0, REACH, STEP)
-        depths = _closed(cut.profile(middle[0] + sign * along))
+        depths = _closed(np.fmax.reduce([cut.profile(middle[0] + sign * along) for cut in cuts]))
         if np.isfinite(depths).all():
             k, _ = rule(along, depths)
             found[f"{side} {name}"] = np.array([middle[0] + sign * along[k], middle[1], depths[k]])
     return found
+
+
+def _cuts(level: Slicer, middle: Floats) -> list[Slice]:
+    """Level cuts through a place and beside it, so that none runs into the slit between open lips."""
+    return [level.at(float(middle[1]) + aside) for aside in (-0.5 * SLIT, 0.0, 0.5 * SLIT)]
 
 
 def _fold(along: Floats, depths: Floats) -> tuple[int, float]:

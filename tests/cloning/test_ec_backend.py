@@ -16,6 +16,9 @@ from cloning.surface import Surface
 from fat import AnimatableFace
 from fba import FaceScene, FeaturePoints
 from fba.scene import rotation_matrix
+from formats import read_scene
+from formats.landmarks import read_landmarks
+from samples import sample
 
 TURN = rotation_matrix((0.3, 0.9, -0.2, 0.8))[:3, :3]
 SAME = {
@@ -44,7 +47,9 @@ def yours(wide: tuple[FaceScene, FeaturePoints]) -> PreparedFace:
 
 
 def test_rules_find_the_parts_of_a_face(mine: PreparedFace, yours: PreparedFace) -> None:
-    for face in (mine, yours):
+    scene = read_scene(sample("faces/quad_head.obj"))
+    parted_lips = prepare(scene, read_landmarks(sample("faces/quad_head.fps.json"), scene), "target")
+    for face in (mine, yours, parted_lips):
         found = rule_points(face.skin)
         for name, key in SAME.items():
             assert np.linalg.norm(found[name] - face.skin.positions[key]) < 0.2, name

@@ -1,0 +1,44 @@
+"""The benchmark of vertex tents measures what it says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.deformation import errors
+from benchmarks.vtc import dense, self_mapped, skin_motions
+from cloning.prepare import PreparedFace, prepare
+from fba.arrays import Floats
+from formats import read_face
+
+
+@pytest.fixture(scope="module")
+def shipped() -> tuple[PreparedFace, Floats]:
+    source = read_face("default")
+    face = prepare(source.scene, source.feature_points, "source")
+    return face, skin_motions(source, face)
+
+
+def test_solvers_give_a_face_its_own_motion_again_and_the_mesh_image_does_not(
+    shipped: tuple[PreparedFace, Floats],
+) -> None:
+    face, motions = shipped
+    some = motions[:, ::11]
+    rows = {m.name: errors(m.found[m.kept], some[m.kept]) for m in self_mapped(face, some)}
+    for name in ("tents, quadrangles", "tents, triangles", "deformation transfer"):
+        assert rows[name]["below 0.1%"] == 1.0
+        assert rows[name]["largest"] < 1e-6
+    image = rows["mesh image, outer skin"]
+    assert rows["mesh image, as published"]["below 2.0%"] < image["below 2.0%"] < 1.0
+
+
+def test_the_dense_skin_is_the_same_surface_with_the_same_motion(shipped: tuple[PreparedFace, Floats]) -> None:
+    face, motions = shipped
+    skin, moved = dense(face.skin, motions[:, :2])
+    n = face.skin.vertex_count
+    assert 18_000 < skin.vertex_count < 20_000
+    assert np.array_equal(skin.vertices[:n], face.skin.vertices)
+    assert np.array_equal(moved[:n], motions[:, :2])
+    first = face.skin.polygons[0][face.skin.polygons[1][0] : face.skin.polygons[1][1]]
+    assert np.allclose(skin.vertices[n], face.skin.vertices[first].mean(axis=0))
+    assert np.allclose(moved[n], motions[first, :2].mean(axis=0))
