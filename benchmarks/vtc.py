@@ -97,7 +97,15 @@ def skin_motions(source: AnimatableFace, face: PreparedFace) -> Floats:
 
 
 def self_mapped(face: PreparedFace, motions: Floats) -> list[Mapped]:
-    """The motions through the solvers alone and through the whole backends."""
+    """The motions given back in every way."""
+    whole = Mapped("backend vtc", build_transfer(face, face, False).apply(motions), np.ones(len(motions), bool))
+    image, copy = build_published(face, face)
+    published = Mapped("mesh image, as published", image.deform(motions) * face.fapu.es0, copy.kept)
+    return [*by_solvers(face, motions), whole, published, by_outer_skin(face, motions)]
+
+
+def by_solvers(face: PreparedFace, motions: Floats) -> list[Mapped]:
+    """The motions through the equations alone."""
     skin, es0 = face.skin, face.fapu.es0
     still = (~motions.any(axis=(1, 2))).astype(float)
     cut = skin.triangles.ravel(), 3 * np.arange(len(skin.triangles) + 1, dtype=np.int32)
@@ -108,14 +116,17 @@ def self_mapped(face: PreparedFace, motions: Floats) -> list[Mapped]:
         out.append(Mapped(name, tents.apply(motions / es0) * es0, everything))
     triangles = deformation_transfer(skin.vertices, skin.vertices, skin.triangles, still, links=skin.links)
     out.append(Mapped("deformation transfer", triangles.apply(motions / es0) * es0, everything))
-    out.append(Mapped("backend vtc", build_transfer(face, face, False).apply(motions), everything))
-    image, copy = build_published(face, face)
-    out.append(Mapped("mesh image, as published", image.deform(motions) * es0, copy.kept))
-    outer = resample(skin, skin, outermost=True)
-    held = np.where(outer.kept & (still == 0.0), FAINT, 1.0)
-    tents = tent_transfer(skin.vertices, outer.vertices, outer.polygons, held, links=skin.links)
-    out.append(Mapped("mesh image, outer skin", tents.apply(motions / es0, wishes=motions / es0) * es0, outer.kept))
     return out
+
+
+def by_outer_skin(face: PreparedFace, motions: Floats) -> Mapped:
+    """The motions through the mesh image of what lies behind no other skin."""
+    skin, es0 = face.skin, face.fapu.es0
+    outer = resample(skin, skin, outermost=True)
+    held = np.where(outer.kept & motions.any(axis=(1, 2)), FAINT, 1.0)
+    tents = tent_transfer(skin.vertices, outer.vertices, outer.polygons, held, links=skin.links)
+    found = tents.apply(motions / es0, wishes=motions / es0) * es0
+    return Mapped("mesh image, outer skin", found, outer.kept)
 
 
 def dense(skin: Surface, motions: Floats | None = None) -> tuple[Surface, Floats]:
