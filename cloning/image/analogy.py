@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from cloning.image.color import UInt8, is_grey, to_rgb, to_yuv
+from cloning.image.color import UInt8, is_grey, luminance, to_rgb, to_yuv
 from cloning.image.eri import ratio_image
 from cloning.image.grid import differences, motion_rows, tent_equations, tents, wanted_differences
 from cloning.image.mask import face_mask, mouth_opening, slit_mask
@@ -31,7 +31,7 @@ from fba.arrays import Bools, Floats, Ints
 Method = Literal["vtc", "eri"]
 METHODS: tuple[Method, ...] = ("vtc", "eri")
 
-RELIEF = 0.05
+RELIEF = 0.02
 """Height of white over black in the image grid, in eye separations: the scale between luminance and pixels. It does
 not depend on the size of the picture. docs/analogy.md says what it does and how it was chosen."""
 
@@ -133,7 +133,7 @@ class Analogy:
         self._height = relief * self._unit / 255.0
         self._across = source_to_target(self._source, self._target, self._names)
         self._planes = [Sampler(plane, order) for plane, order in zip(self._yuv, (3, 1, 1), strict=True)]
-        self._neutral = Sampler(to_yuv(source.rgb)[0], shrink=1.0 / self._across.scale)
+        self._neutral = Sampler(luminance(source.rgb), shrink=1.0 / self._across.scale)
         fine = [refined(self._moved(points)) for points in expressions]
         self._box = self._box_of(fine)
         self._domain = self._domain_of(fine)
@@ -174,11 +174,11 @@ class Analogy:
         rows, columns = self._box
         changed = np.zeros(self._picture.shape[:2], bool)
         changed[rows, columns] = displaced | (warp.mask > 0)
-        rgb, luminance = self._picture.copy(), self._yuv[0].copy()
+        rgb, light = self._picture.copy(), self._yuv[0].copy()
         rgb[rows, columns] = np.where(changed[rows, columns, None], to_rgb(warped), rgb[rows, columns])
-        luminance[rows, columns] = warped[0]
+        light[rows, columns] = warped[0]
         head = turned(self._source, expression.points, self._names)
-        return AnalogyResult(rgb, luminance, changed, dict(warp.moved), steps, shown, head)
+        return AnalogyResult(rgb, light, changed, dict(warp.moved), steps, shown, head)
 
     def _moved(self, expression: Places) -> dict[str, tuple[float, float]]:
         return moved_points(self._source, expression, self._target, self._names)
@@ -227,7 +227,7 @@ class Analogy:
         rows, columns = np.nonzero((warp.mask > 0) | self._near_domain(warp.labels))
         pair = np.zeros((2, *warp.labels.shape))
         shrink = 1.0 / self._expression_scale(own)
-        samplers = (self._neutral, Sampler(to_yuv(expression.rgb)[0], shrink=shrink))
+        samplers = (self._neutral, Sampler(luminance(expression.rgb), shrink=shrink))
         for plane, points, sampler in zip(pair, (self._source, own), samplers, strict=True):
             affine = warp.mesh.affine(self._places(warp, points))
             plane[rows, columns] = sampler.at(mapped(affine, warp.labels, rows, columns, self._box))

@@ -27,6 +27,12 @@ def to_yuv(rgb: UInt8 | Floats) -> Floats:
     return np.tensordot(YUV_FROM_RGB, np.asarray(rgb, np.float64), axes=(1, 2))
 
 
+def luminance(rgb: UInt8) -> Floats:
+    """(h, w) Y of (h, w, 3) colours."""
+    found: Floats = rgb @ LUMA
+    return found
+
+
 def to_rgb(yuv: Floats) -> UInt8:
     """(3, h, w) planes to (h, w, 3) uint8 colours, rounded; what no screen can show is clipped channel by channel."""
     rgb = np.moveaxis(np.tensordot(RGB_FROM_YUV, yuv, axes=(1, 0)), 0, 2)
