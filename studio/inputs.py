@@ -10,6 +10,7 @@ from fba.findings import Finding
 from fba.orientation import orient
 from fba.scene import FaceScene
 from formats.landmarks import landmarks_beside, read_landmarks
+from formats.textures import texture_names
 
 
 def scene_of(found: FaceScene | AnimatableFace) -> FaceScene:
@@ -28,20 +29,29 @@ def points_of(found: FaceScene | AnimatableFace, file: Path, landmarks: Path | N
 
 
 def missing_textures(scene: FaceScene, folder: Path) -> list[str]:
-    """Texture files that the materials name and that do not lie where a file in `folder` would look for them."""
-    named = [m.texture for shape in scene.shapes for m in shape.materials if m.texture and ":/" not in m.texture]
-    return [name for name in dict.fromkeys(named) if not (folder / name.replace("\\", "/")).exists()]
+    """Textures that the materials name, but that are neither in the file read nor where one in `folder` looks."""
+    return [name for name in _absent(scene, folder) if name not in scene.images]
+
+
+def _absent(scene: FaceScene, folder: Path) -> list[str]:
+    named = [name for name in texture_names(scene) if ":/" not in name]
+    return [name for name in named if not (folder / name.replace("\\", "/")).exists()]
+
+
+def remarks_of(scene: FaceScene) -> list[Finding]:
+    """What the reader of a file had to leave out or to guess."""
+    return [Finding("info", "file", remark) for remark in getattr(scene.document, "remarks", ())]
 
 
 def left_behind(scene: FaceScene, read_from: Path, written_to: Path) -> list[Finding]:
-    """Textures that lie beside the file that was read, but neither beside nor in the one that was written."""
-    gone = set(missing_textures(scene, read_from.parent)) - set(scene.images)
+    """Textures that lie beside or in the file that was read, but neither beside nor in the one that was written."""
+    gone = set(missing_textures(scene, read_from.parent))
     if written_to.suffix.lower() in (".glb", ".gltf"):
         from formats.gltf.materials import left_out
 
         lost, advice = left_out(scene), "make a PNG or JPEG, which glTF can hold, of the texture {}"
     else:
-        lost = missing_textures(scene, written_to.parent)
+        lost = _absent(scene, written_to.parent)
         advice = "copy the texture {} from " + str(read_from.parent) + " to the new folder"
     return [
         Finding("warning", "texture-left-behind", advice.replace("{}", name, 1)) for name in lost if name not in gone

@@ -41,7 +41,8 @@ class Materials:
 
     def _entry(self, material: Material, textured: bool) -> Json:
         opacity = 1.0 - min(max(material.transparency, 0.0), 1.0)
-        texture = self._texture(material.texture) if textured else None
+        image = self._texture(material.texture)  # Kept in the file even where nothing shows it.
+        texture = image if textured else None
         color = to_linear(material.diffuse) if texture is None else [1.0, 1.0, 1.0]
         surface: Json = {
             "baseColorFactor": [*color, opacity],

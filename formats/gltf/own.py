@@ -22,7 +22,7 @@ from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.mesh import Material, PolyMesh
 from fba.scene import FaceScene, Frame, Node, Role, Shape, Transform
 from formats.gltf.buffers import Buffer, Json
-from formats.gltf.targets import table_borders
+from formats.gltf.targets import table_borders, target_name
 
 FORMAT = "fba-gltf/1"
 KEY = "fba"
@@ -118,7 +118,7 @@ def _node_json(node: Node, pack: Pack) -> Json:
 def face_json(face: AnimatableFace, pack: Pack, nodes: Mapping[str, int]) -> Json:
     """FAPUs, notes, feature points and tables, exactly.
 
-    nodes : name of a transform -> the glTF node that its tables drive; for other programs, as are `targets`.
+    nodes : name of a transform -> the glTF node that its tables drive. For other programs, as are a table's "targets".
     """
     points = {key: asdict(point) for key, point in face.feature_points.items()}
     return {
@@ -131,11 +131,12 @@ def face_json(face: AnimatableFace, pack: Pack, nodes: Mapping[str, int]) -> Jso
 
 def _table_json(table: FaceDefTable, pack: Pack, nodes: Mapping[str, int]) -> Json:
     borders = table_borders(table).tolist()
+    targets = [{"value": b, "target": target_name(table, b, borders[-1])} for b in borders if b]
     entry: Json = {
         "fapID": table.fap_id,
         "highLevelSelect": table.high_level_select,
         "name": table.name,
-        "borders": borders,
+        "targets": targets,
         "faceDefMesh": [_mesh_json(mesh, pack) for mesh in table.meshes],
     }
     if table.transforms:

@@ -49,7 +49,7 @@ def _face(file: Path, landmarks: Path | None) -> tuple[dict[str, Any], list[Any]
     from fba.findings import Finding
     from formats import read
     from studio.describe import describe_face, describe_points, describe_scene, mesh_findings
-    from studio.inputs import missing_textures, scene_of, target_points
+    from studio.inputs import missing_textures, remarks_of, scene_of, target_points
 
     found = read(file)
     textures = [
@@ -66,7 +66,7 @@ def _face(file: Path, landmarks: Path | None) -> tuple[dict[str, Any], list[Any]
         if points is not None:
             more, neutral = describe_points(scene, points)
             about, findings = {**about, **more}, [*findings, *neutral]
-    return {"file": str(file), "kind": kind, **about}, [*mesh_findings(scene), *textures, *findings]
+    return {"file": str(file), "kind": kind, **about}, [*remarks_of(scene), *mesh_findings(scene), *textures, *findings]
 
 
 def _print(about: dict[str, Any], out: Any) -> None:

@@ -428,10 +428,12 @@ def test_images_outside_the_folder_are_neither_read_nor_written(tmp_path: Path) 
     assert [(p.name, p.read_bytes()) for p in (tmp_path / "out").iterdir()] == [("there.png", b"mine")]
 
 
-def test_a_texture_on_a_surface_without_coordinates_is_left_out(tmp_path: Path) -> None:
+def test_a_texture_on_a_surface_without_coordinates_is_kept_but_not_shown(tmp_path: Path) -> None:
     mesh = PolyMesh.from_faces([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     material = Material("skin", (0.5, 0.4, 0.3), texture="a.png")
     write(FaceScene((Shape("a", mesh, materials=(material,)),), images={"a.png": PNG}), tmp_path / "a.glb")
     document, _ = parts(tmp_path / "a.glb")
-    assert "images" not in document
+    assert len(document["materials"]) == 1
+    assert "baseColorTexture" not in document["materials"][0]["pbrMetallicRoughness"]
+    assert read(tmp_path / "a.glb").images == {"a.png": PNG}
     assert document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"][:3] == to_linear((0.5, 0.4, 0.3))

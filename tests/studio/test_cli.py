@@ -507,6 +507,8 @@ def test_textures_come_along_or_are_named(tmp_path: Path) -> None:
     for name in ("new/head.usda", "new/head.glb", "head.usda"):
         assert "warning" not in fba("export", head, "-o", tmp_path / name).stdout
     assert (tmp_path / "new" / "skin.png").read_bytes() == (tmp_path / "skin.png").read_bytes()
+    (tmp_path / "new" / "skin.png").unlink()
+    assert "skin.png is not there" not in fba("inspect", tmp_path / "new" / "head.glb").stdout
 
 
 def test_the_word_default_names_the_shipped_source() -> None:
