@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fat.face import AnimatableFace
 from fat.tables import FaceDefMesh, FaceDefTable, FaceDefTables, FaceDefTransform, TransformField
 from fba.errors import FbaError, InputFileError
+from fba.faps import FAP_COUNT
 from fba.fapu import Fapu
 from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.mesh import Material, PolyMesh
@@ -242,6 +243,8 @@ def _read_point(own: Any) -> FeaturePoint:
 
 def _read_table(own: Any, unpack: Unpack) -> FaceDefTable:
     fap_id = int(own["fapID"])
+    if not 1 <= fap_id <= FAP_COUNT:
+        raise InputFileError(f"there is a table of FAP {fap_id}; FAPs are numbered 1 to {FAP_COUNT}")
     meshes = tuple(
         FaceDefMesh(
             str(mesh["shape"]),

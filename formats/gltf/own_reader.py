@@ -61,7 +61,10 @@ def read_unchanged(data: GltfData, own: Json) -> FaceScene | AnimatableFace | No
     bytes_of_face = data.bytes_of(view) if isinstance(view, int) and 0 <= view < len(views) else b""
     if hashlib.sha256(bytes_of_face).hexdigest() != own.get("sha256"):
         return None
-    found = read_own(own, bytes_of_face)
+    try:
+        found = read_own(own, bytes_of_face)
+    except InputFileError as error:
+        raise data.fail(str(error)) from None
     scene = found.scene if isinstance(found, AnimatableFace) else found
     if not same_meshes(data, scene):
         return None
