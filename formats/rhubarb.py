@@ -31,8 +31,8 @@ FADE = 0.1
 within their own time and are shown in full at their middle."""
 
 LARGEST_FILE = 64 << 20
-LARGEST_FRAMES = 1_000_000
-"""More frames than that are refused before any memory is taken: five hours at 50 a second."""
+LARGEST_FRAMES = 200_000
+"""More frames than that are refused before any memory is taken: an hour at 50 a second."""
 
 Cue = tuple[float, int]
 """Start in seconds and viseme."""

@@ -29,12 +29,12 @@ class Model(Protocol):
 
     total: int
 
-    def above(self, symbol: int) -> int:
-        """Sum of the frequencies of all larger symbols."""
+    def bounds(self, symbol: int) -> tuple[int, int]:
+        """Sum of the frequencies of all larger symbols, and the same with the symbol's own."""
         ...
 
     def find(self, target: int) -> int:
-        """The symbol with ``above(s) <= target < above(s - 1)``."""
+        """The symbol whose bounds hold ``low <= target < high``."""
         ...
 
     def update(self, symbol: int) -> None:
@@ -48,8 +48,8 @@ class UniformModel:
     def __init__(self, count: int) -> None:
         self.total = count
 
-    def above(self, symbol: int) -> int:
-        return self.total - 1 - symbol
+    def bounds(self, symbol: int) -> tuple[int, int]:
+        return self.total - 1 - symbol, self.total - symbol
 
     def find(self, target: int) -> int:
         return self.total - 1 - target
@@ -66,18 +66,19 @@ class AdaptiveModel:
         self._below = np.arange(count + 1, dtype=np.int64)
         """Entry k: sum of the frequencies of the k largest symbols."""
 
-    def above(self, symbol: int) -> int:
-        return int(self._below[self._count - 1 - symbol])
+    def bounds(self, symbol: int) -> tuple[int, int]:
+        behind = self._count - symbol
+        return self._below.item(behind - 1), self._below.item(behind)
 
     def find(self, target: int) -> int:
         return self._count - int(self._below.searchsorted(target, "right"))
 
     def update(self, symbol: int) -> None:
         if self.total == FULL:
-            halved = (np.diff(self._below) + 1) // 2
-            self._below = np.concatenate([[0], np.cumsum(halved)])
+            self._below[1:] = np.cumsum((np.diff(self._below) + 1) // 2)
+            self.total = self._below.item(self._count)
         self._below[self._count - symbol :] += 1
-        self.total = int(self._below[-1])
+        self.total += 1
 
 
 class RunEncoder:
@@ -92,10 +93,9 @@ class RunEncoder:
     def put(self, symbol: int, model: Model) -> None:
         """Code one symbol and let the model learn it."""
         length = self._high - self._low + 1
-        above = model.above(symbol)
-        model_high = model.above(symbol - 1) if symbol else model.total
-        self._high = self._low - 1 + length * model_high // model.total
-        self._low += length * above // model.total
+        below, above = model.bounds(symbol)
+        self._high = self._low - 1 + length * above // model.total
+        self._low += length * below // model.total
         model.update(symbol)
         while True:
             if self._high < _HALF:
@@ -155,10 +155,9 @@ class RunDecoder:
         length = self._high - self._low + 1
         target = ((self._code - self._low + 1) * model.total - 1) // length
         symbol = model.find(target)
-        above = model.above(symbol)
-        model_high = model.above(symbol - 1) if symbol else model.total
-        self._high = self._low - 1 + length * model_high // model.total
-        self._low += length * above // model.total
+        below, above = model.bounds(symbol)
+        self._high = self._low - 1 + length * above // model.total
+        self._low += length * below // model.total
         model.update(symbol)
         while True:
             if self._high < _HALF:

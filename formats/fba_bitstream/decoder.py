@@ -30,8 +30,8 @@ from formats.fba_bitstream.syntax import (
     require_number,
 )
 
-LARGEST_FRAMES = 200_000
-"""More frames are not read: two hours at 25 a second. A frame may take no more than six bits."""
+LARGEST_FRAMES = 100_000
+"""More frames are not read: an hour at 25 a second. Six bits can be a frame, so that small files could take very long."""
 
 DEFAULT_RATE = 30.0
 _INT32 = 2**31

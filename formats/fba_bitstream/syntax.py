@@ -108,13 +108,14 @@ class Segment:
 
     def model(self, fap_id: int, number: int, intra: bool) -> tuple[int, Model]:
         """Lowest level and the model of the levels from there on; one for each field, new at every intra plane."""
+        found = None if intra else self._models.get((fap_id, number))
+        if found is not None:
+            return found
         low, high = self.field_range(fap_id, number, intra)
-        if intra:
+        if intra or low == high:
+            # A symbol that cannot be another one changes nothing in the coder, so there is nothing to learn either.
             return low, UniformModel(high - low + 1)
-        found = self._models.get((fap_id, number))
-        if found is None:
-            found = self._models[fap_id, number] = (low, AdaptiveModel(high - low + 1))
-        return found
+        return self._models.setdefault((fap_id, number), (low, AdaptiveModel(high - low + 1)))
 
     def runs(self) -> Iterator[tuple[int, list[RateKey]]]:
         """The runs of one plane: FAP 1, FAP 2 (where they are masked), then all others in one, even if none is."""
