@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from faces import small_face
 from pxr import Usd, UsdGeom, UsdSkel
 from typer.testing import CliRunner, Result
 
 from authoring.open_jaw import strict
 from fat.profiles import ARKIT, VRM, profile_shapes
-from formats import read_face, read_scene
+from formats import read_face, read_scene, write
 from formats.shapes import read_shapes
 from formats.usd import read_shape_set
 from formats.usd.validate import validate_stage
@@ -87,6 +89,21 @@ def test_gltf_holds_the_shapes(tmp_path: Path) -> None:
     found = read_shapes(out, read_scene(default_source()))
     assert found.names == made.names
     assert np.allclose(found.deltas, made.deltas, rtol=0, atol=1e-6)
+
+
+def test_a_stream_becomes_the_animation_of_a_gltf(tmp_path: Path) -> None:
+    write(small_face(), tmp_path / "face.wrl")
+    result = fba("export", tmp_path / "face.wrl", "-o", tmp_path / "face.gltf", "--stream", "demo")
+    assert result.exit_code == Outcome.OK, result.output
+    assert "8 tables for 26 vertices, 150 frames at 25/s" in result.stdout
+    document = json.loads((tmp_path / "face.gltf").read_text("utf-8"))
+    (animation,) = document["animations"]
+    assert {c["target"]["path"] for c in animation["channels"]} == {"weights", "rotation"}
+    times = document["accessors"][animation["samplers"][0]["input"]]
+    assert (times["count"], times["max"]) == (150, [pytest.approx(149 / 25)])
+    result = fba("export", tmp_path / "face.wrl", "-o", tmp_path / "face.ply", "--stream", "demo")
+    assert result.exit_code == Outcome.BAD_INPUT
+    assert "without animation" in result.stderr
 
 
 @pytest.mark.parametrize(
