@@ -168,9 +168,6 @@ def _read_json(text: str, source: str) -> tuple[list[Cue], float, list[Finding]]
     if gaps:
         text = f"{len(gaps)} cues do not start where the one before ends; gaps are idle, overlaps are cut"
         findings.append(Finding("warning", "cue-gaps", text, f"cue {gaps[0]}"))
-    first = cues[0][0]
-    if first > 0.0:
-        cues.insert(0, (0.0, mouth_visemes()["X"]))
     return _merged(cues, end, source), end, findings
 
 
@@ -203,8 +200,8 @@ def _unknown(value: object) -> str:
 
 
 def _merged(cues: list[Cue], end: float, source: str) -> list[Cue]:
-    """Cues that last, neighbours of one viseme as one."""
-    lasting = [a for a, b in pairwise([*cues, (end, 0)]) if b[0] > a[0]]
+    """Cues that last, from time 0 on, neighbours of one viseme as one."""
+    lasting = [a for a, b in pairwise([(0.0, mouth_visemes()["X"]), *cues, (end, 0)]) if b[0] > a[0]]
     if not lasting:
         raise FapStreamError(f"{source}: no mouth cue lasts any time")
     return [lasting[0], *(b for a, b in pairwise(lasting) if a[1] != b[1])]

@@ -16,22 +16,21 @@ from formats.fba_bitstream.syntax import (
     GROUPS,
     HELD,
     INTERPOLATED,
-    NONE,
     OBJECT_STARTS,
     PLAIN_BITS,
     PLANE_STARTS,
     QUANTIZER_BITS,
     RANGE_UNIT,
     SEQUENCE_END,
+    FieldKey,
     Ranges,
-    RateKey,
     Segment,
     range_fields,
     require_number,
 )
 
 LARGEST_FRAMES = 100_000
-"""More frames are not read: an hour at 25 a second. Six bits can be a frame, so that small files could take very long."""
+"""More frames are not read: an hour at 25 a second. Six bits can be a frame, so that small files could take long."""
 
 DEFAULT_RATE = 30.0
 _INT32 = 2**31
@@ -52,7 +51,7 @@ class Decoder:
         self._ranges = (Ranges.default(0), Ranges.default(1))
         self._signalled: set[tuple[int, int]] = set()
         """Kind of plane (0, 1) and FAP whose ranges the stream has told."""
-        self._held: dict[RateKey, int] = {}
+        self._held: dict[FieldKey, int] = {}
         """Last value of every field."""
         self._flags: dict[int, tuple[int, ...]] = {}
         self._number = -1
@@ -91,13 +90,13 @@ class Decoder:
         bits = self._bits
         boundary = bits.position // 8 * 8 + 8
         stuffed = all(bits.bit_at(k) == (k > bits.position) for k in range(bits.position, boundary))
-        for aligned in (boundary,) if stuffed else (bits.position,):
-            word = bits.word_at(aligned) if aligned % 8 == 0 else None
-            if word == SEQUENCE_END:
-                return False
-            if word in PLANE_STARTS:
-                bits.position = aligned + 32
-                return True
+        aligned = boundary if stuffed else bits.position
+        word = bits.word_at(aligned) if aligned % 8 == 0 else None
+        if word == SEQUENCE_END:
+            return False
+        if word in PLANE_STARTS:
+            bits.position = aligned + 32
+            return True
         if bits.size - bits.position < 8 and not any(map(bits.bit_at, range(bits.position, bits.size))):
             text = "there is no end code; the file may be cut"
             self._tell("warning", "no-end-code", text)
@@ -171,8 +170,7 @@ class Decoder:
                 self._tell("warning", "interpolated-faps", text)
             if kind in (HELD, INTERPOLATED):
                 mask += [fap_id for fap_id in group if bits.bit()]
-            elif kind != NONE:
-                assert kind == ALL
+            elif kind == ALL:
                 mask += group
         bits.bit()  # the suggested gender
         if bits.bit():
@@ -204,7 +202,7 @@ class Decoder:
             text = "the stream relies on default ranges, on which sources differ; values may be wrong"
             self._tell("warning", "default-ranges", text)
 
-    def _run(self, segment: Segment, fields: list[RateKey], intra: bool) -> None:
+    def _run(self, segment: Segment, fields: list[FieldKey], intra: bool) -> None:
         run = RunDecoder(self._bits)
         for fap_id, number in fields:
             low, model = segment.model(fap_id, number, intra)

@@ -27,8 +27,8 @@ from formats.fba_bitstream.syntax import (
     QUANTIZER_BITS,
     RANGE_UNIT,
     SEQUENCE_END,
+    FieldKey,
     Ranges,
-    RateKey,
     Segment,
     range_fields,
     rounded,
@@ -43,7 +43,7 @@ class _Levels:
     """One plane: is it intra, and the level of every field."""
 
     intra: bool
-    levels: dict[RateKey, int]
+    levels: dict[FieldKey, int]
 
 
 @dataclass
@@ -78,7 +78,7 @@ class Encoder:
     def _split(self) -> Iterator[_Part]:
         """Levels of all planes: intra where the mask changes, and where a change is too large but the value is not."""
         part: _Part | None = None
-        last: dict[RateKey, int] = {}
+        last: dict[FieldKey, int] = {}
         for frame in range(len(self._stream)):
             mask = tuple((np.flatnonzero(self._stream.mask[frame]) + 1).tolist())
             wanted = self._values(frame, mask)
@@ -92,9 +92,9 @@ class Encoder:
         if part is not None:
             yield part
 
-    def _values(self, frame: int, mask: tuple[int, ...]) -> dict[RateKey, int]:
+    def _values(self, frame: int, mask: tuple[int, ...]) -> dict[FieldKey, int]:
         fields = {1: self._stream.visemes[frame], 2: self._stream.expressions[frame]}
-        wanted: dict[RateKey, int] = {}
+        wanted: dict[FieldKey, int] = {}
         for fap_id in mask:
             if fap_id in HIGH_LEVEL:
                 wanted |= {(fap_id, k): int(fields[fap_id][k]) for k in range(len(HIGH_LEVEL[fap_id]))}
@@ -107,7 +107,7 @@ class Encoder:
         ranges = Ranges({k: -v for k, v in widest.items()}, widest)
         return Segment(self._quantizer, mask, (ranges, ranges))
 
-    def _fits(self, mask: tuple[int, ...], wanted: dict[RateKey, int], last: dict[RateKey, int]) -> bool:
+    def _fits(self, mask: tuple[int, ...], wanted: dict[FieldKey, int], last: dict[FieldKey, int]) -> bool:
         """Whether a predicted plane can tell these values, or an intra plane could not either."""
         widest = self._widest(mask)
         predicted = intra = True
@@ -123,11 +123,11 @@ class Encoder:
         return predicted or not intra
 
     def _quantize(
-        self, mask: tuple[int, ...], wanted: dict[RateKey, int], last: dict[RateKey, int], intra: bool
-    ) -> dict[RateKey, int]:
+        self, mask: tuple[int, ...], wanted: dict[FieldKey, int], last: dict[FieldKey, int], intra: bool
+    ) -> dict[FieldKey, int]:
         """Levels of one plane; `last` becomes what the decoder has after it."""
         widest = self._widest(mask)
-        levels: dict[RateKey, int] = {}
+        levels: dict[FieldKey, int] = {}
         for (fap_id, number), value in wanted.items():
             step = widest.step(fap_id, number)
             low, high = widest.field_range(fap_id, number, intra)

@@ -43,7 +43,7 @@ PLAIN_BITS = {1: 1, 2: 2}
 _ROLL_RANGES = (1080, 420)
 """Ranges of FAP 47 that the only published decoder takes; the table of the overview says 300 and 60."""
 
-RateKey = tuple[int, int]
+FieldKey = tuple[int, int]
 """A FAP and the number of its field (0 for low-level FAPs)."""
 
 
@@ -95,7 +95,7 @@ class Segment:
     quantizer: int
     mask: tuple[int, ...]
     ranges: tuple[Ranges, Ranges]
-    _models: dict[RateKey, tuple[int, Model]] = field(default_factory=dict)
+    _models: dict[FieldKey, tuple[int, Model]] = field(default_factory=dict)
 
     def field_range(self, fap_id: int, number: int, intra: bool) -> tuple[int, int]:
         """Lowest and highest level of a field; low-level FAPs have one."""
@@ -117,7 +117,7 @@ class Segment:
             return low, UniformModel(high - low + 1)
         return self._models.setdefault((fap_id, number), (low, AdaptiveModel(high - low + 1)))
 
-    def runs(self) -> Iterator[tuple[int, list[RateKey]]]:
+    def runs(self) -> Iterator[tuple[int, list[FieldKey]]]:
         """The runs of one plane: FAP 1, FAP 2 (where they are masked), then all others in one, even if none is."""
         for fap_id, fields in HIGH_LEVEL.items():
             if fap_id in self.mask:

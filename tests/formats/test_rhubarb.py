@@ -103,6 +103,11 @@ def test_gaps_overlaps_and_a_late_start() -> None:
     assert shown[100, 0] == shown[300, 10] == shown[500, 0] == shown[650, 14] == shown[850, 1] == 1.0
 
 
+def test_a_late_start_of_lines() -> None:
+    shown = weights(b"0.30\tD\n0.60\tX\n")
+    assert shown[100, 0] == shown[450, 10] == 1.0
+
+
 def test_contents_decide_not_the_name(tmp_path: Path) -> None:
     (tmp_path / "speech.tsv").write_bytes(HI_JSON)
     (tmp_path / "speech.json").write_text("\ufeff" + HI.replace("\n", "\r\n"), "utf-8")
@@ -121,7 +126,7 @@ def test_contents_decide_not_the_name(tmp_path: Path) -> None:
         (b"0.0\tX\n0.5\tQ\n", TextSyntaxError, "line 2, column 1: 'Q' is no mouth shape; Rhubarb's are A, B, C"),
         (b"0.5\tX\n0.2\tD\n", TextSyntaxError, "0.2 is before 0.5"),
         (b"0.5\tX\n", FapStreamError, "1 mouth cues"),
-        (b"0.5\tX\n0.5\tX\n", FapStreamError, "no mouth cue lasts"),
+        (b"0.0\tD\n0.0\tX\n", FapStreamError, "no mouth cue lasts"),
         (b"1e9\tX\n2e9\tX\n", FapStreamError, "more than 200000 frames"),
         (b"{", TextSyntaxError, "line 1, column 2: no valid JSON"),
         (b"[" * 100_000, FapStreamError, "nested too deeply"),
