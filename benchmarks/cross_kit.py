@@ -1,10 +1,10 @@
 """Shapes of one face kit, cloned onto another kit, beside the shapes of the same names that its own artist made.
 
-    python -m benchmarks.cross_kit [--json FILE] [--backends NAMES] [--write]
+    python -m benchmarks.cross_kit [--json FILE] [--backends NAMES] [--sheet FILE] [--write]
 
 MakeHuman -> Ready Player Me, ICT-FaceKit -> Ready Player Me, MakeHuman -> ICT-FaceKit, wherever their folders are
 there. Two artists never mean the same by "mouthSmileLeft", so no number is an error: they say how much of what the
-other artist made is met. --write puts the tables and the picture into docs/cross_kit.md.
+other artist made is met. --write puts the tables and the public part of the picture into docs/cross_kit.md.
 """
 
 from __future__ import annotations
@@ -54,6 +54,9 @@ STILL = 1e-3
 SHOWN = ("jawOpen", "eyeBlinkLeft", "mouthSmileLeft", "browInnerUp", "mouthFunnel")
 PICTURE = (118, 140)
 PAIRS = (("MakeHuman", "ICT"), ("MakeHuman", "RPM"), ("ICT", "RPM"))
+PUBLIC = ("MakeHuman's own", "MakeHuman to ICT", "ICT's own")
+"""Rows of faces that anybody may show (CC0, MIT)."""
+
 ROWS = ("MakeHuman's own", "MakeHuman to ICT", "ICT's own", "MakeHuman to RPM", "ICT to RPM", "RPM's own")
 
 
@@ -128,6 +131,7 @@ def main() -> None:
     parser.add_argument("--faces", type=Path, default=SHARED)
     parser.add_argument("--backends", default=",".join(b.name for b in backends()), help="names, by commas")
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--sheet", type=Path, help="draw all rows here")
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
     kits = {kit.name: kit for kit in read_kits(options.faces)}
@@ -152,7 +156,10 @@ def main() -> None:
         print_rows(f"{name}, left mirrored against right", found)
     if options.json is not None:
         options.json.write_text(json.dumps(_plain(results, floors), indent=2))
+    if options.sheet is not None:
+        sheet.save(options.sheet)
     if options.write:
+        sheet.rows = [row for row in sheet.rows if row.label in PUBLIC]
         sheet.save(DOCS / "images" / "cross_kit.png")
         put_tables(DOCS / "cross_kit.md", {"means": means_table(results, floors), "shapes": shapes_table(results)})
 

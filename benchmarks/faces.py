@@ -4,8 +4,8 @@
                                [--write]
 
 A face in which no face is found is a row too, and a second one with some given points (tests/data/NAME.fps.json).
-Each face has a process of its own, so that its memory can be told. --sheets draws every face; --write puts the table into docs/faces.md
-and beside it the pictures of those faces whose licence lets anybody show them.
+Each face has a process of its own, so that its memory can be told. --sheets draws every face; --write puts the table
+into docs/faces.md and beside it the pictures of those faces whose licence lets anybody show them.
 """
 
 from __future__ import annotations
