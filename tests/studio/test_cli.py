@@ -30,7 +30,19 @@ from studio.cli.arguments import parse_faps
 from studio.cli.console import print_json
 from studio.cli.outcome import Outcome
 
-VERBS = ("demo", "inspect", "landmarks", "clone", "author", "export", "play", "check", "doctor")
+VERBS = (
+    "demo",
+    "inspect",
+    "landmarks",
+    "clone",
+    "author",
+    "export",
+    "convert",
+    "play",
+    "check",
+    "analogy",
+    "doctor",
+)
 
 
 def fba(*words: object) -> Result:
