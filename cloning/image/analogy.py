@@ -35,8 +35,9 @@ RELIEF = 0.02
 """Height of white over black in the image grid, in eye separations: the scale between luminance and pixels. It does
 not depend on the size of the picture. docs/analogy.md says what it does and how it was chosen."""
 
-SHUT = 0.03
-"""Gap between shut lips, in widths of the mouth."""
+SHUT, PARTED = 0.07, 0.03
+"""Gap up to which lips count as shut, and by how much an expression must open them, in widths of the mouth. Detected on
+the shared photographs, shut lips have gaps up to 0.06, lips that show teeth from 0.08 on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +271,7 @@ class Analogy:
     def _opens(self, expression: Places, moved: Places) -> bool:
         """True where lips part that both neutral faces keep shut."""
         still = max(mouth_opening(self._source), mouth_opening(self._target))
-        return still < SHUT < min(mouth_opening(expression), mouth_opening(moved))
+        return still < SHUT and still + PARTED < min(mouth_opening(expression), mouth_opening(moved))
 
     def _show_mouth(self, warped: Floats, warp: _Warp, own: Places, expression: Picture) -> Bools:
         """Put the source's pixels between the lips, and say where."""
