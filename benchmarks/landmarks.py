@@ -53,9 +53,12 @@ GROUPS = {
     + tuple(f"3.{k}" for k in (1, 2, 3, 4, 7, 8, 9, 10, 11, 12, 13, 14)),
     "face": ("2", "3", "4", "5", "8", "9"),
     "vague": (*JAW, "10", "11"),
+    "all": (*JAW, "2", "3", "4", "5", "8", "9", "10", "11"),
 }
 """Single points or whole groups; points on eyeballs, teeth and tongue count nowhere. Vague are corners of the jaw,
-ears and skull, which two people would not place at one spot: they count in no other group."""
+ears and skull, which two people would not place at one spot: of the groups they count in "all" alone."""
+BAR = (0.08, 0.25)
+"""Mean and maximum, in eye widths, that all points of a face should reach."""
 INSIDE = ("3.5", "3.6", "9.8", "9.9", "9.10", "9.11")
 WRONG = 0.25
 """Eye widths: a point farther off than this should have been marked as unsure."""
@@ -83,7 +86,11 @@ def main() -> None:
     source = prepare(face.scene, face.feature_points, "source")
     names = [n for n in options.only.split(",") if n]
     rows = []
-    print(f"{'face':22}{'way':11}{'score':>6}{'s':>6}  " + "".join(f"{name + ' mean/max':>22}" for name in GROUPS))
+    print(
+        f"{'face':22}{'way':11}{'score':>6}{'s':>6}  "
+        + "".join(f"{name + ' mean/max':>22}" for name in GROUPS)
+        + "   bar"
+    )
     for known in faces(options.faces, names):
         shown = posed(known) if options.pose else known
         for way in options.ways.split(","):
@@ -208,6 +215,8 @@ def line(row: Mapping[str, object]) -> str:
     for name in GROUPS:
         values = [v for key, v in off.items() if belongs(key, name)]
         text += f"{np.mean(values):15.3f}/{max(values):.3f} "
+    reached = all(value <= bar for value, bar in zip((np.mean(values), max(values)), BAR, strict=True))
+    text += " reached" if reached else " missed "
     good = sum(off[key] < 0.08 for key in LANDMARKS if key in off)
     return f"{text}  {good} of the 20 < 8 %; {row['wrong']} points > {WRONG:g}, {row['unsaid']} of them not said"
 

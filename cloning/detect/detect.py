@@ -13,6 +13,7 @@ from cloning.detect.head import FACE_SCORE, SAMPLES, Head, facing, find_pose, is
 from cloning.detect.inside import inner_points
 from cloning.detect.model import FaceTemplate, Source, ready
 from cloning.detect.neighbours import by_neighbours
+from cloning.detect.patches import by_patches
 from cloning.detect.register import agreement
 from cloning.detect.rules import OPEN, by_rule
 from cloning.detect.samples import sample
@@ -159,6 +160,8 @@ def _auto(head: Head, source: Source, known: Mapping[str, Floats]) -> _Found:
     differ = {key: float(np.linalg.norm(place - guess[key])) for key, place in ruled.items()}
     places = _evened({**places, **ruled, **known}, known, guess)
     places |= {k: p for k, p in by_neighbours(head.skin, skin, places).items() if k not in known}
+    laid = {k: p for k, p in by_patches(head.skin, skin, places).items() if k not in known}
+    places = _evened({**places, **laid}, known, places)
     parted = _parted(places, known, _start(head, skin, known))
     return {**places, **parted}, differ, {**residual, **dict.fromkeys(parted, LIMITS)}
 

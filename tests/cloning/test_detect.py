@@ -11,6 +11,7 @@ import pytest
 from cloning.detect import Detection, detect_points
 from cloning.detect.model import ready
 from cloning.detect.neighbours import by_neighbours
+from cloning.detect.patches import by_patches
 from cloning.detect.xiang import LANDMARKS
 from cloning.prepare import DERIVED, NECESSARY, PreparedFace, prepare
 from fat import AnimatableFace
@@ -150,6 +151,30 @@ def test_nostrils_and_chin_follow_their_rules(
     surface = FeaturePoints({k: p for k, p in tri[1].items() if p.shape is not None})
     off = errors(posed, detected.points, surface)
     assert max(off[k] for k in ("9.1", "9.2", "9.4", "9.5", "2.10", "2.11", "2.12", "5.1", "5.2")) < 0.2
+
+
+def test_ears_and_skull_follow_their_shape(known: PreparedFace) -> None:
+    """On the source as it is nothing moves; ears that lie elsewhere are found there from where they were."""
+    skin = ready(known).skin
+    own = skin.positions
+    same = by_patches(skin, skin, own)
+    assert {*(f"10.{k}" for k in range(1, 11)), "11.1", "11.4", "11.6", "2.13", "2.14"} <= set(same)
+    assert max(float(np.linalg.norm(same[key] - own[key])) for key in same) < 0.01
+    off = {key: place + np.array([0.0, 0.05, -0.05]) if key[:2] == "10" else place for key, place in own.items()}
+    again = by_patches(skin, skin, off)
+    assert max(float(np.linalg.norm(again[key] - own[key])) for key in again if key[:2] != "11") < 0.03
+    # A mask has neither.
+    mask = replace(skin, triangles=skin.triangles[skin.vertices[skin.triangles][:, :, 2].min(axis=1) > -0.4])
+    assert by_patches(mask, skin, own) == {}
+
+
+def test_vague_points_are_found_too(
+    posed: FaceScene, detected: Detection, tri: tuple[FaceScene, FeaturePoints]
+) -> None:
+    surface = FeaturePoints({k: p for k, p in tri[1].items() if p.shape is not None})
+    off = {k: v for k, v in errors(posed, detected.points, surface).items() if k[:3] in ("10.", "11.", "2.1")}
+    assert np.mean(list(off.values())) < 0.1
+    assert max(off.values()) < 0.25
 
 
 def torus() -> FaceScene:
