@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from cloning.bodies import body
+from cloning.correct import smooth_step
 from cloning.parts import PUPILS, eye_center
 from cloning.prepare import PreparedFace
 from fba.arrays import Floats, Ints
@@ -26,6 +27,9 @@ LAYER = 0.03
 
 SHARE = 0.15
 """Skin that rests nearer to the ball than the source's comes off it within a motion of this many radii."""
+
+HIDDEN = 0.03
+"""Skin that the source keeps this deep inside its ball is the back of a lid and may lie anywhere in the ball."""
 
 FAR = 0.5
 """Clearance of skin that is not near an eyeball, in radii."""
@@ -143,7 +147,8 @@ class EyeGuard:
         flat = place[:, 0] ** 2 + place[:, 1] ** 2
         front = np.sqrt(np.maximum(needed**2 - flat, 0.0))
         behind = (flat < needed**2) & (place[:, 2] > -0.1 * radius)
-        motion[ball.vertices[vertex], some[which], 2] += np.where(behind, np.maximum(front - place[:, 2], 0.0), 0.0)
+        push = np.where(behind, np.maximum(front - place[:, 2], 0.0), 0.0)
+        motion[ball.vertices[vertex], some[which], 2] += push * smooth_step(1.0 + wanted[vertex, which] / HIDDEN)
 
 
 def eye_guard(source: PreparedFace, target: PreparedFace, carry: Callable[[Floats], Floats]) -> EyeGuard:

@@ -59,11 +59,15 @@ PASSES = 4
 FARTHEST = 0.2
 """No vertex is lifted by more than this share of the eye's opening."""
 
-CLOSES = 0.15
-"""Rims are watched in motions that take one at least this share of the opening towards the other."""
+CLOSES = (0.15, 0.3)
+"""Rims are watched in motions that take one more than the first share of the opening towards the other, on the mean;
+from the second on they follow in full. A brow that comes down may press on a corner of the eye and closes nothing."""
 
 SPARE = 0.1
 """How much farther than the source's, as a share of the opening, a rim may go."""
+
+MEETS = 0.05
+"""Lids that have passed each other by this share of the opening are closed; a source's may overlap by a third."""
 
 EYES = (
     (("3.11", "3.7"), (("3.1", 3, 1), ("3.3", 4, -1))),
@@ -194,12 +198,13 @@ class Eye:
         travel: Floats = np.interp(row, row[used], share)
         return travel
 
-    def follow(self, part: int, offsets: Floats, travel: Floats, spare: float) -> Floats:
+    def follow(self, part: int, offsets: Floats, travel: Floats, spare: Floats | float) -> Floats:
         """Offsets (m,) along y that bring a rim a share of the way to the other one.
 
         Parameters
         ----------
-        spare : how much farther it may be, as a share of the opening.
+        travel : (s,) the least share.
+        spare : how much farther it may be, as a share of the opening, (s,) or the same everywhere.
         """
         lid = self.lids[part]
         way = self.heights[1 - part] - self.heights[part]
@@ -328,23 +333,43 @@ class RimFollower:
         for mine, yours in zip(self.mine, self.yours, strict=True):
             if mine is None or yours is None:
                 continue
-            for part in range(2):
-                moving = np.any(source_motion[mine.lids[part].vertices] != 0.0, axis=(0, 2))
-                for k in np.flatnonzero(moving):
-                    travel = _evened(mine.travel(part, source_motion[:, k] / self.units[0]))
-                    if travel.max() > CLOSES:
-                        lift = yours.follow(part, motion[:, k] / self.units[1], travel, SPARE)
-                        motion[yours.lids[part].vertices, k, 1] += lift * self.units[1]
+            lids = np.concatenate([lid.vertices for lid in mine.lids])
+            for k in np.flatnonzero(np.any(source_motion[lids] != 0.0, axis=(0, 2))):
+                self._close(mine, yours, source_motion[:, k] / self.units[0], motion[:, k])
+
+    def _close(self, mine: Eye, yours: Eye, source_motion: Floats, motion: Floats) -> None:
+        """Correct one motion (n_t, 3) in place, given the source's in eye separations."""
+        gone = [_evened(mine.travel(part, source_motion)) for part in range(2)]
+        watched = [smooth_step((way.mean() - CLOSES[0]) / (CLOSES[1] - CLOSES[0])) for way in gone]
+        if not any(watched):
+            return
+        offsets = motion / self.units[1]
+        needed, now = _needed(*gone), [yours.travel(part, offsets) for part in range(2)]
+        met = now[0] + now[1] >= 1.0 + MEETS
+        for part in range(2):
+            if not watched[part]:
+                continue
+            least = np.where(met, np.minimum(needed[part], now[part]), needed[part])
+            lift = yours.follow(part, offsets, least, gone[part] - least + SPARE)
+            motion[yours.lids[part].vertices, 1] += watched[part] * lift * self.units[1]
 
 
 def _evened(travel: Floats) -> Floats:
-    """The travel (s,) of a rim, with what nearly keeps up with the feature point taken as far as it."""
-    middle = float(travel[SLICES - 1])
+    """The travel (s,) of a rim, with what nearly keeps up with the feature point taken as far as it, or to its end."""
+    middle = min(float(travel[SLICES - 1]), 1.0)
     if middle <= 0.0:
         return travel
     keeps_up = smooth_step((travel / middle - EVEN[0]) / (EVEN[1] - EVEN[0]))
     even: Floats = travel + keeps_up * np.maximum(middle - travel, 0.0)
     return even
+
+
+def _needed(upper: Floats, lower: Floats) -> tuple[Floats, Floats]:
+    """What is needed of the travels (s,) of both rims: lids that overlap may overlap less."""
+    most = np.maximum(upper + lower - 1.0 - MEETS, 0.0)
+    ways = np.maximum(upper, 0.0), np.maximum(lower, 0.0)
+    share = most / np.maximum(ways[0] + ways[1], 1.0)
+    return upper - share * ways[0], lower - share * ways[1]
 
 
 def rim_follower(source: PreparedFace, target: PreparedFace) -> RimFollower:

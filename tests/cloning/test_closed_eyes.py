@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cloning import clone
-from cloning.prepare import prepare
-from cloning.rims import eyes
+from cloning.prepare import PreparedFace, prepare
+from cloning.rims import Eye, eyes, rim_follower
 from fat import AnimatableFace
 from fat.evaluate import Player
 from fba import Role
@@ -104,3 +104,28 @@ def test_a_rim_follows_and_its_feature_points_stay(source: AnimatableFace) -> No
             reached = eye.travel(part, lifted)[eye.open & away]
             assert np.abs(reached - 0.1).mean() < 0.02
             assert not eye.travel(part, still).any()
+
+
+def test_rims_move_only_where_lids_stay_open(source: AnimatableFace) -> None:
+    face = prepare(source.scene, source.feature_points, "source")
+    follower = rim_follower(face, face)
+    for eye in follower.yours:
+        assert eye is not None
+        overlapping = lowered(face, eye, 1.3)
+        for share, corrected in ((1.12, False), (0.8, True)):
+            before = lowered(face, eye, share)
+            after = before.copy()
+            follower.apply(overlapping, after)
+            assert np.any(after != before) == corrected, share
+        pressed, after = lowered(face, eye, 0.1), 0.0 * overlapping
+        follower.apply(pressed, after)
+        assert not after.any(), "a lid that comes down a little closes nothing"
+
+
+def lowered(face: PreparedFace, eye: Eye, share: float) -> Floats:
+    """An upper lid that goes down by a share of the opening, (n, 1, 3) in mesh units."""
+    lid = eye.lids[0]
+    row = np.flatnonzero(eye.open)
+    motion = np.zeros((face.skin.vertex_count, 1, 3))
+    motion[lid.vertices, 0, 1] = -share * np.interp(lid.rest[:, 0], lid.span[row], eye.opening[row]) * face.fapu.es0
+    return motion
