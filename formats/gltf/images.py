@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from urllib.parse import unquote
 
-from formats.gltf.data import GltfData
+from formats.gltf.data import GltfData, Json
 
 _EXTENSIONS = {"image/png": ".png", "image/jpeg": ".jpg"}
 
@@ -25,12 +25,12 @@ class Images:
 
     def name(self, index: object) -> str | None:
         """The path of an image beside the file, or a name for one inside it; None for one that is nowhere."""
+        image = self._data.item("images", index)  # Refuses what is no number.
         if index not in self._names:
-            self._names[index] = self._find(index)
+            self._names[index] = self._find(image, index)
         return self._names[index]
 
-    def _find(self, index: object) -> str | None:
-        image = self._data.item("images", index)
+    def _find(self, image: Json, index: object) -> str | None:
         uri = image.get("uri")
         kind = str(image.get("mimeType", ""))
         if isinstance(uri, str) and not uri.startswith("data:"):

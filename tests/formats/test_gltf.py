@@ -315,3 +315,12 @@ def test_damaged_bytes_are_read_or_refused(tmp_path: Path, start: int, length: i
     except FbaError:
         return
     assert np.isfinite(scene.shapes[0].mesh.vertices).all()
+
+
+@pytest.mark.parametrize("source", [[], {}, "0", 1, True, -1])
+def test_a_texture_of_no_image_is_refused(tmp_path: Path, source: object) -> None:
+    b = square(material=0)
+    b.document["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    b.document["textures"], b.document["images"] = [{"source": source}], [{"uri": "skin.png"}]
+    with pytest.raises(InputFileError, match="'images'"):
+        b.read(tmp_path)
