@@ -69,8 +69,8 @@ class FapError:
     fap_id: int | None
 
 
-ROUNDING = 0.01
-"""Motions below this, in FAP units, are what 32-bit tables leave of none."""
+LEAST = 1.0
+"""FAP units: the least that a stream can say. Motions below it are what rounded tables leave of none."""
 
 
 def fap_error(source: Mapping[int, float], target: Mapping[int, float]) -> FapError:
@@ -85,9 +85,9 @@ def fap_error(source: Mapping[int, float], target: Mapping[int, float]) -> FapEr
     errors = {k: abs(target[k] - source[k]) for k in common}
     total = sum(abs(source[k]) for k in common)
     worst = max(errors, key=lambda k: errors[k], default=None)
-    wrong = sum(errors.values())
-    relative = wrong / total if total else (float("inf") if wrong > ROUNDING else 0.0)
-    return FapError(relative, 0.0 if worst is None else errors[worst], worst)
+    largest = 0.0 if worst is None else errors[worst]
+    relative = sum(errors.values()) / total if total else (float("inf") if largest > LEAST else 0.0)
+    return FapError(relative, largest, worst)
 
 
 def cross_talk(values: Mapping[int, float], fap_id: int) -> tuple[float, int | None]:
