@@ -35,6 +35,9 @@ Progress = Callable[[str, float], None]
 Key = tuple[int, int]
 T = TypeVar("T")
 
+EYEBALL_FAPS = {Role.EYE_LEFT: (27, 29), Role.EYE_RIGHT: (28, 30)}
+"""Thrust and pupil of each eye; gaze is a transform of the eyeball."""
+
 STILL = 1e-4
 """Vertices that never move farther than this, in eye separations (six thousandths of a millimetre), are left out ..."""
 
@@ -131,6 +134,8 @@ def clone_with_report(
         raise CloningError(
             f"the source '{source.scene.name}' holds no motion" + (" of these FAPs" if wanted else "") + " to clone"
         )
+    idle = _without_eyeballs(yours.scene)
+    motions = [m for m in motions if m.fap_id not in idle]
     offsets = _carry(transfer, [m.offsets for m in motions], stages)
     cloned = [replace(m, offsets=o) for m, o in zip(motions, offsets, strict=True) if o]
     rigged, transforms, said = _rig(yours, turning, wanted, as_published)
@@ -277,6 +282,11 @@ def _tables(
     if exact:
         return build_tables(scene, fapu, motions, transforms)
     return compact(build_tables(scene, fapu, motions, transforms, threshold=STILL), fapu, rounding=ROUNDING)
+
+
+def _without_eyeballs(scene: FaceScene) -> frozenset[int]:
+    """FAPs of eyeballs (thrust, pupils) that the face does not have: lids alone would press on nothing."""
+    return frozenset(fap for role, faps in EYEBALL_FAPS.items() if not scene.with_role(role) for fap in faps)
 
 
 def _no_node(what: str, numbers: Sequence[int], where: str) -> Finding:
