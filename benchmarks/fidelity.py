@@ -1,19 +1,20 @@
 """How faithful the backends are: measures on faces whose motion is known, and on one whose is not.
 
     python -m benchmarks.fidelity [--source mean|shipped] [--backends NAMES] [--makehuman FOLDER] [--faces FOLDER]
-                                  [--sheets FOLDER] [--json FILE]
+                                  [--sheets FOLDER] [--json FILE] [--write]
 
 A MakeHuman head is cloned onto two other phenotypes, as they are and decimated to another topology, where its own
 units are the truth (as they are, and scaled by FAPUs), and onto ICT-FaceKit, where no truth exists. The head is a mean
 phenotype with MakeHuman's own units, so that nothing but cloning differs from the truth; or the shipped source's,
-whose units are smoothed. Each backend's default mode stands beside the published one.
+whose units are smoothed. Each backend's default mode stands beside the published one. --write puts the tables into
+docs/benchmarks.md and docs/backends.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.scene import FaceScene
 from fba.shapes import ShapeSet
 from formats import read_scene
+from samples.build.arkit_docs import put_tables
 from samples.build.makehuman import open_makehuman
 from samples.build.phenotypes import KnownHead, decimated, known, phenotype_a, phenotype_b, phenotype_mean
 from samples.build.source import source_head
@@ -37,6 +39,18 @@ SHARED = Path(__file__).resolve().parents[2] / "shared"
 LIPS = (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))
 LIDS = {"eyeBlinkLeft": ("3.1", "3.3"), "eyeBlinkRight": ("3.2", "3.4")}
 MOVING = 0.01
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+DOCUMENTED = {
+    "truth": "truth error, visible skin",
+    "fapu_truth": "against the truth scaled by FAPUs",
+    "fp_before": "feature points, before correction",
+    "fp_after": "feature points, in the finished face",
+    "lid": "lid gap after a blink, middle",
+    "lid_worst": "lid gap after a blink, worst",
+    "lip": "lip gap",
+    "flips%": "flips, %",
+    "still": "back of the head",
+}
 SOURCES = {"mean": phenotype_mean, "shipped": source_head}
 FACE_UNITS = ("eyeBlinkLeft", "mouthSmileLeft", "jawOpen", "browInnerUp", "mouthFunnel", "cheekPuff")
 
@@ -58,6 +72,7 @@ def main() -> None:
     parser.add_argument("--faces", type=Path, default=SHARED)
     parser.add_argument("--sheets", type=Path)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--write", action="store_true")
     parser.add_argument("--backends", default=",".join(b.name for b in backends()), help="names, by commas")
     options = parser.parse_args()
     makehuman = open_makehuman(options.makehuman)
@@ -87,6 +102,11 @@ def main() -> None:
                     draw(target, cloned, options.sheets / f"fidelity_{target.name}_{mode.replace(' ', '_')}.png")
     if options.json is not None:
         options.json.write_text(json.dumps(rows, indent=2))
+    if options.write:
+        put_tables(DOCS / "benchmarks.md", {"fidelity": document_table(rows)})
+        for name in ("fit", "dt", "fmc"):
+            if any(row["backend"] == name for row in rows):
+                put_tables(DOCS / "backends" / f"{name}.md", {"fidelity": backend_table(rows, name)})
 
 
 def targets(makehuman: object, faces: Path) -> Iterator[Target]:
@@ -139,6 +159,34 @@ HEADINGS = (
     "stretch",
     "still",
 )
+
+
+def document_table(rows: Sequence[Mapping[str, object]]) -> str:
+    """The table of docs/benchmarks.md: one line for each backend and mode, one column for each target."""
+    names = list(dict.fromkeys(str(row["target"]) for row in rows))
+    modes = list(dict.fromkeys((str(row["backend"]), bool(row["published"])) for row in rows))
+    cells = {(row["target"], row["backend"], row["published"]): row for row in rows}
+    head = f"| | {' | '.join(names)} |\n|---|{'---|' * len(names)}\n"
+    lines = []
+    for measure, title in DOCUMENTED.items():
+        lines.append(f"| **{title}** |{' |' * len(names)}")
+        for backend, published in modes:
+            found = [cells[name, backend, published].get(measure) for name in names]
+            shown = " | ".join("-" if value is None else f"{value:.3f}" for value in found)
+            lines.append(f"| {backend}{', published' if published else ''} | {shown} |")
+    return head + "\n".join(lines) + "\n"
+
+
+def backend_table(rows: Sequence[Mapping[str, object]], backend: str) -> str:
+    """The table of one backend's page: default mode, in brackets as published."""
+    names = list(dict.fromkeys(str(row["target"]) for row in rows))
+    cells = {(row["target"], row["published"]): row for row in rows if row["backend"] == backend}
+    lines = [f"| | {' | '.join(names)} |", f"|---|{'---|' * len(names)}"]
+    for measure, title in DOCUMENTED.items():
+        found = [(cells[name, False].get(measure), cells[name, True].get(measure)) for name in names]
+        shown = " | ".join("-" if a is None else f"{a:.3f} [{b:.2f}]" for a, b in found)
+        lines.append(f"| {title} | {shown} |")
+    return "\n".join(lines) + "\n"
 
 
 def print_row(target: str, mode: str, row: dict[str, float]) -> None:

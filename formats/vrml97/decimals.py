@@ -69,7 +69,8 @@ def _places(values: Floats) -> int | None:
 
 
 def _exact(values: Floats, places: int) -> bool:
-    whole = np.rint(values * 10.0**places)
+    with np.errstate(over="ignore"):
+        whole = np.rint(values * 10.0**places)
     # A power of ten up to 10**22 is exact, so that one rounding gives the float64 nearest to the decimal.
     return bool(np.all((whole / 10.0**places == values) & (np.abs(whole) < _LARGEST)))
 
