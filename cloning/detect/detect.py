@@ -11,6 +11,7 @@ import numpy as np
 from cloning.detect.confidence import confidences, describe
 from cloning.detect.head import FACE_SCORE, SAMPLES, Head, facing, find_pose, isolate, settle
 from cloning.detect.inside import inner_points
+from cloning.detect.lips import on_own_lip
 from cloning.detect.model import FaceTemplate, Source, ready
 from cloning.detect.neighbours import by_neighbours
 from cloning.detect.patches import by_patches
@@ -317,6 +318,7 @@ def _placed(
     search = TriangleSearch(head.skin.vertices, head.skin.triangles)
     near = search.closest(np.array(list(places.values())))
     on = {key: (head.vertices[head.skin.triangles[near.triangles[k]]], near.weights[k]) for k, key in enumerate(places)}
+    on |= {key: (head.vertices[corners], weights) for key, (corners, weights) in on_own_lip(head.skin, places).items()}
     trust = {**trust, **dict.fromkeys(PUPILS, EYEBALL)}
     on |= _pupils(head)
     inside = inner_points(head, skin, places)

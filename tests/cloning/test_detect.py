@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cloning.detect import Detection, detect_points
+from cloning.detect.lips import on_own_lip
 from cloning.detect.model import ready
 from cloning.detect.neighbours import by_neighbours
 from cloning.detect.patches import by_patches
@@ -151,6 +152,20 @@ def test_nostrils_and_chin_follow_their_rules(
     surface = FeaturePoints({k: p for k, p in tri[1].items() if p.shape is not None})
     off = errors(posed, detected.points, surface)
     assert max(off[k] for k in ("9.1", "9.2", "9.4", "9.5", "2.10", "2.11", "2.12", "5.1", "5.2")) < 0.2
+
+
+def test_touching_lips_keep_their_own_points(known: PreparedFace) -> None:
+    skin = known.skin
+    pairs = (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))
+    middle = {key: 0.5 * (skin.positions[a] + skin.positions[b]) for a, b in pairs for key in (a, b)}
+    found = on_own_lip(skin, {**skin.positions, **middle})
+    upper, lower = skin.distances(["8.1", "8.2"])
+    for a, b in pairs:
+        assert np.all(upper[found[a][0]] < lower[found[a][0]])
+        assert np.all(lower[found[b][0]] < upper[found[b][0]])
+        for key in (a, b):
+            vertices, weights = found[key]
+            assert np.linalg.norm(weights @ skin.vertices[vertices] - middle[key]) < 0.02
 
 
 def test_ears_and_skull_follow_their_shape(known: PreparedFace) -> None:
