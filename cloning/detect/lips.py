@@ -34,7 +34,7 @@ def on_own_lip(skin: Surface, places: Mapping[str, Floats]) -> dict[str, tuple[I
     corners = skin.triangles[starts.triangles]
     seeds = corners[np.arange(len(outer)), np.argmax(starts.weights, axis=1)]
     away = dijkstra(skin.graph, indices=seeds)
-    found = {}
+    found: dict[str, tuple[Ints, Floats]] = {}
     for lip, (_, inner) in enumerate(LIPS):
         own = (away[lip] < away[1 - lip])[skin.triangles].all(axis=1)
         ids = [key for key in inner if key in places]
