@@ -12,7 +12,7 @@ import numpy as np
 
 from cloning.backends import SkinTransfer
 from cloning.deformation import deformation_transfer
-from cloning.local_transfer import BareTransfer, GoalTransfer, carrying_map, goal_transfer, map_measures, template_copy
+from cloning.local_transfer import BareTransfer, GoalTransfer, carrying_map, goal_transfer, template_copy
 from cloning.prepare import PreparedFace
 from cloning.shape_solver import ShapeTransfer
 from cloning.template.correspondence import correspond
@@ -57,4 +57,4 @@ def _build_published(source: PreparedFace, target: PreparedFace) -> BareTransfer
         held[quietest[np.unique(part[quietest], return_index=True)[1]]] = 1.0
         return deformation_transfer(skin.vertices, copy, skin.triangles, held, links=skin.links, uniform=True)
 
-    return BareTransfer(source, target, skin_map, factor, map_measures(skin_map), {"landmarks": len(landmarks)})
+    return BareTransfer(source, target, skin_map, factor, skin_map.health(), {"landmarks": len(landmarks)})

@@ -26,7 +26,7 @@ from cloning.cylinder import Cylinder, cylinder, round_the_back
 from cloning.ec_rules import rule_points
 from cloning.interpolate import TriangleMesh2D
 from cloning.local_frames import frames_of, sizes_in
-from cloning.local_transfer import carrying_map, map_measures
+from cloning.local_transfer import carrying_map
 from cloning.mesh_image import SHEET, draw_mesh
 from cloning.prepare import PreparedFace
 from cloning.similarity import fit_similarity
@@ -65,7 +65,7 @@ def build_transfer(source: PreparedFace, target: PreparedFace, as_published: boo
         skin_map,
         line,
         on_line,
-        map_measures(skin_map),
+        skin_map.health(),
         {"points": len(centers), "lip_line": len(line)},
     )
 

@@ -47,13 +47,10 @@ def build_transfer(source: PreparedFace, target: PreparedFace, as_published: boo
         find,
         scale_field(source, target),
     )
-    found = ~skin_map.unmatched
     return AlignedTransfer(
         skin_map,
         {
-            "unmatched_share": float(skin_map.unmatched.mean()),
-            "mean_distance_es": float(skin_map.distances[found].mean()) if found.any() else 0.0,
-            "rest_without_partner": float(skin_map.fill.unreached.sum()),
+            **skin_map.health(),
             "fitted_share": float(fitted.valid.mean()),
             "fit_residual_es": float(np.mean(fitted.residual[fitted.valid])) if fitted.valid.any() else 0.0,
         },

@@ -46,14 +46,9 @@ def build_transfer(source: PreparedFace, target: PreparedFace, as_published: boo
         return build_published(source, target)
     scale = scale_field(source, target)
     skin_map = build_skin_map(source.skin, source.labels, target.skin, target.labels, scale)
-    found = ~skin_map.unmatched
     return AlignedTransfer(
         skin_map,
-        {
-            "unmatched_share": float(skin_map.unmatched.mean()),
-            "mean_distance_es": float(skin_map.distances[found].mean()) if found.any() else 0.0,
-            "rest_without_partner": float(skin_map.fill.unreached.sum()),
-        },
+        skin_map.health(),
         {"farthest_es": FARTHEST, "least_facing": LEAST_FACING, "refinements": len(skin_map.refinements)},
     )
 

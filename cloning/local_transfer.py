@@ -73,16 +73,6 @@ def carrying_map(
     return SkinMap(refinements, matrix, np.ones((skin.vertex_count, 3)), fill, unmatched, places.residual)
 
 
-def map_measures(skin_map: SkinMap) -> dict[str, float]:
-    """Health of a map, for the report."""
-    found = ~skin_map.unmatched
-    return {
-        "unmatched_share": float(skin_map.unmatched.mean()),
-        "mean_distance_es": float(skin_map.distances[found].mean()) if found.any() else 0.0,
-        "rest_without_partner": float(skin_map.fill.unreached.sum()),
-    }
-
-
 def goal_transfer(
     source: PreparedFace,
     target: PreparedFace,
@@ -106,7 +96,7 @@ def goal_transfer(
         ids,
         blend(source.skin.vertices, points, ratios(source.fapu, target.fapu, ids) / target.fapu.es0),
         factor,
-        {**map_measures(skin_map), **measures},
+        {**skin_map.health(), **measures},
         {
             "point_weight": POINT_WEIGHT,
             "moving_weight": MOVING,

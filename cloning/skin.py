@@ -67,6 +67,15 @@ class SkinMap:
         self.fill.apply(carried)
         return carried
 
+    def health(self) -> dict[str, float]:
+        """How well the two skins found each other, for the report."""
+        found = ~self.unmatched
+        return {
+            "unmatched_share": float(self.unmatched.mean()),
+            "mean_distance_es": float(self.distances[found].mean()) if found.any() else 0.0,
+            "rest_without_partner": float(self.fill.unreached.sum()),
+        }
+
 
 def build_skin_map(
     source: Surface, source_labels: Labels, target: Surface, target_labels: Labels, scale: Floats

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from cloning.backends import SkinTransfer
-from cloning.local_transfer import BareTransfer, carrying_map, goal_transfer, map_measures
+from cloning.local_transfer import BareTransfer, carrying_map, goal_transfer
 from cloning.mesh_image import AROUND
 from cloning.prepare import PreparedFace
 from cloning.resampling import Polygons, Resampled, resample
@@ -56,7 +56,7 @@ def build_published(source: PreparedFace, target: PreparedFace) -> tuple[BareTra
         held = _anchors(skin, copy, reach)
         return tent_transfer(skin.vertices @ turn.T, vertices, copy.polygons, held, links=skin.links, uniform=True)
 
-    measures = {**map_measures(skin_map), **_measures(copy)}
+    measures = {**skin_map.health(), **_measures(copy)}
     return BareTransfer(source, target, skin_map, factor, measures, {"image_columns": AROUND}, turn), copy
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fba.arrays import Floats
+from fba.errors import MeshError
+from fba.scene import FaceScene
 
 
 def transform_fields(matrix: Floats) -> dict[str, tuple[float, ...]]:
@@ -59,3 +61,19 @@ def _axis_angle(rotation: Floats) -> tuple[float, float, float, float]:
         axis = axis if axis @ twist >= 0.0 else -axis
     x, y, z = axis.tolist()
     return (x, y, z, angle)
+
+
+def into_shape(scene: FaceScene, name: str) -> Floats:
+    """(3, 3) that takes world offsets to a shape's own coordinates.
+
+    Raises
+    ------
+    MeshError
+        If a transform above the shape scales it to nothing.
+    """
+    linear: Floats = scene.world_matrix(name)[:3, :3]
+    try:
+        inverse = np.linalg.inv(linear)
+    except np.linalg.LinAlgError:
+        raise MeshError(f"shape '{name}' is scaled to nothing by the transforms above it") from None
+    return np.asarray(inverse, dtype=np.float64)

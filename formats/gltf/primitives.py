@@ -19,7 +19,7 @@ from fba.scene import Shape
 from formats.gltf.buffers import Buffer, Json, to_single
 from formats.gltf.materials import Materials
 from formats.gltf.targets import Target
-from formats.usd.normals import SmoothNormals
+from formats.normals import SmoothNormals
 
 VERTEX = "_VERTEX"
 """Attribute that says which vertex of the shape each vertex of a primitive is."""

@@ -16,6 +16,7 @@ from formats.gltf.own_reader import own_json, read_unchanged
 from formats.gltf.primitives import split
 from formats.gltf.targets import Target
 from formats.gltf.writer import Draft
+from formats.matrices import into_shape
 
 
 def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
@@ -25,7 +26,7 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
     places = scene.file_order()
     targets: dict[str, list[Target]] = {}
     for shape in scene.shapes:
-        turn = _inverse(scene, shape.name).T
+        turn = into_shape(scene, shape.name).T
         targets[shape.name] = []
         for name, deltas in zip(shapes.names, shapes.deltas, strict=True):
             inside: Floats = scene.frame.from_file(deltas[places[shape.name]]) @ turn
@@ -35,15 +36,6 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
     draft = Draft(scene, targets)
     draft.own["shapeNames"] = list(shapes.names)
     draft.save(path)
-
-
-def _inverse(scene: FaceScene, name: str) -> Floats:
-    linear: Floats = scene.world_matrix(name)[:3, :3]
-    try:
-        inverse = np.linalg.inv(linear)
-    except np.linalg.LinAlgError:
-        raise MeshError(f"shape '{name}' is scaled to nothing by the transforms above it") from None
-    return np.asarray(inverse, dtype=np.float64)
 
 
 def read_shapes(path: Path) -> ShapeSet | None:

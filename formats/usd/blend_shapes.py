@@ -20,9 +20,9 @@ from fba.arrays import Floats, Floats32, Ints
 from fba.errors import FaceDefTablesError, InputFileError
 from fba.faps import fap
 from fba.fapu import Fapu
+from formats.normals import SmoothNormals
 from formats.usd.axes import StageAxes
 from formats.usd.names import Namer
-from formats.usd.normals import SmoothNormals
 from formats.usd.properties import ints, need, put, put_array, rows, to_single, vt
 
 AGREEMENT = 1e-5

@@ -13,10 +13,10 @@ from fba.arrays import Floats, Ints
 from fba.errors import InputFileError, MeshError
 from fba.mesh import Material, PolyMesh
 from fba.scene import Role, Shape
+from formats.normals import SmoothNormals
 from formats.usd.axes import StageAxes
 from formats.usd.materials import UV_PRIMVAR, MaterialLibrary, read_material
 from formats.usd.names import Namer
-from formats.usd.normals import DERIVED, SmoothNormals
 from formats.usd.properties import (
     get,
     get_twin,
@@ -34,6 +34,9 @@ from formats.usd.xforms import value_of
 
 MATERIAL_FAMILY = "materialBind"
 GROUP_FAMILY = "faceGroups"
+
+DERIVED = "derivedNormals"
+"""Own attribute of a mesh whose normals are the writer's work; the reader leaves them out."""
 
 
 def write_mesh(

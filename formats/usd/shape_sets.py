@@ -11,6 +11,7 @@ from fba.arrays import Floats
 from fba.errors import InputFileError, MeshError
 from fba.scene import FaceScene
 from fba.shapes import ShapeSet
+from formats.matrices import into_shape
 from formats.usd.names import Namer, name_of
 from formats.usd.properties import get, ints, put, put_string, rows, to_single
 from formats.usd.reader import own_root, read_stage
@@ -32,7 +33,7 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
         targets = []
         for shape in scene.shapes:
             own = draft.targets(shape.name)
-            turn = _inverse(scene, shape.name).T
+            turn = into_shape(scene, shape.name).T
             for name, token, deltas in zip(shapes.names, tokens, shapes.deltas, strict=True):
                 inside: Floats = scene.frame.from_file(deltas[places[shape.name]]) @ turn
                 index = np.flatnonzero(np.any(to_single(inside) != 0.0, axis=1)).astype(np.int32)
@@ -41,15 +42,6 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
             targets.append(own)
         bind_targets(draft, targets)
     save_layer(draft.layer, path)
-
-
-def _inverse(scene: FaceScene, name: str) -> Floats:
-    linear: Floats = scene.world_matrix(name)[:3, :3]
-    try:
-        inverse = np.linalg.inv(linear)
-    except np.linalg.LinAlgError:
-        raise MeshError(f"shape '{name}' is scaled to nothing by the transforms above it") from None
-    return np.asarray(inverse, dtype=np.float64)
 
 
 def read_shapes(path: Path) -> ShapeSet | None:

@@ -13,13 +13,13 @@ from fat.face import AnimatableFace
 from fat.tables import FaceDefTransform
 from fba.errors import FaceDefTablesError
 from fba.scene import FaceScene, Shape
+from formats.normals import SmoothNormals
 from formats.usd.axes import StageAxes, axes_for, write_axes
 from formats.usd.blend_shapes import MeshTargets, write_face_def_mesh
 from formats.usd.facts import write_facts
 from formats.usd.materials import MaterialLibrary
 from formats.usd.meshes import write_mesh
 from formats.usd.names import Namer, node_paths, put_name
-from formats.usd.normals import SmoothNormals
 from formats.usd.properties import put, put_string, put_targets
 from formats.usd.stages import quiet, save_layer
 from formats.usd.xforms import write_transform

@@ -1,7 +1,7 @@
 """Smooth normals for meshes that bring none, and how blend shapes turn them.
 
-A USD mesh without normals is drawn with facets; with normals that its blend shapes do not turn, it is drawn as if
-it did not move.
+USD and glTF meshes without normals are drawn with facets; with normals that their blend shapes do not turn, they are
+drawn as if they did not move.
 """
 
 from __future__ import annotations
@@ -10,9 +10,6 @@ import numpy as np
 
 from fba.arrays import Floats, Ints
 from fba.mesh import PolyMesh
-
-DERIVED = "derivedNormals"
-"""Own attribute of a mesh whose normals are the writer's work; the reader leaves them out."""
 
 
 class SmoothNormals:
