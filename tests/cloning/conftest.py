@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from remade import bare, warped
 
+from cloning.prepare import PreparedFace, prepare
 from fat import AnimatableFace
 from fba import FaceScene, FeaturePoints
 from fba.arrays import Floats
@@ -35,3 +36,15 @@ def wide(source: AnimatableFace) -> tuple[FaceScene, FeaturePoints]:
         return np.stack([x, y, z], axis=1) * es0 * 1.3
 
     return warped(scene, points, warp)
+
+
+@pytest.fixture(scope="session")
+def mine(source: AnimatableFace) -> PreparedFace:
+    """The shipped source, prepared."""
+    return prepare(source.scene, source.feature_points, "source")
+
+
+@pytest.fixture(scope="session")
+def yours(wide: tuple[FaceScene, FeaturePoints]) -> PreparedFace:
+    """The head with other proportions, prepared."""
+    return prepare(*wide, "target")

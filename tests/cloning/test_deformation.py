@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
+from sheets import grid, halves, held_border, offsets
 
 from cloning.deformation import deformation_transfer
 from cloning.prepare import prepare
@@ -18,28 +19,7 @@ from fba.scene import rotation_matrix
 
 def sheet(n: int, seed: int, rough: float = 0.15) -> tuple[Floats, Ints]:
     """A curved, uneven square of n x n vertices and its triangles."""
-    random = np.random.default_rng(seed)
-    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-1.0, 1.0, n), np.linspace(-1.0, 1.0, n), indexing="ij"))
-    vertices = np.stack([x, y, 0.4 * np.cos(2.0 * x) * np.cos(y)], axis=1)
-    corner = np.arange(n * n).reshape(n, n)
-    quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1).reshape(-1, 4)
-    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32)
-    inside = np.abs(vertices[:, :2]).max(axis=1, keepdims=True) < 0.999
-    return vertices + inside * rough / n * random.normal(size=vertices.shape), triangles
-
-
-def offsets(vertices: Floats, count: int, seed: int) -> Floats:
-    """(n, K, 3) smooth motions of a sheet that rest at its border."""
-    random = np.random.default_rng(seed)
-    border = np.clip(2.0 - 2.0 * np.abs(vertices[:, :2]).max(axis=1), 0.0, 1.0)
-    waves = np.sin(vertices @ random.normal(size=(3, count)) * 2.0)
-    moved: Floats = (border[:, None] * waves)[:, :, None] * random.normal(size=(count, 3)) * 0.3
-    return moved
-
-
-def held_border(vertices: Floats) -> Floats:
-    held: Floats = (np.abs(vertices[:, :2]).max(axis=1) > 0.999).astype(float)
-    return held
+    return grid(n, seed, rough), halves(n)
 
 
 def with_fourth(vertices: Floats, triangles: Ints) -> Floats:

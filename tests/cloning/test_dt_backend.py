@@ -33,19 +33,9 @@ FEW = (3, 5, 8, 12, 19, 31, 37, 61)
 
 
 @pytest.fixture(scope="module")
-def mine(source: AnimatableFace) -> PreparedFace:
-    return prepare(source.scene, source.feature_points, "source")
-
-
-@pytest.fixture(scope="module")
 def motions(source: AnimatableFace, mine: PreparedFace) -> Floats:
     """(n, K, 3) a few motions of the source's skin."""
     return np.stack([mine.skin.join(m.offsets) for m in source_motions(source, frozenset(FEW))], axis=1)
-
-
-@pytest.fixture(scope="module")
-def yours(wide: tuple[FaceScene, FeaturePoints]) -> PreparedFace:
-    return prepare(*wide, "target")
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,6 @@ from cloning.prepare import PreparedFace, prepare
 from cloning.source import source_motions
 from cloning.surface import Surface
 from fat import AnimatableFace
-from fba import FaceScene, FeaturePoints
 from fba.scene import rotation_matrix
 from formats import read_scene
 from formats.landmarks import read_landmarks
@@ -34,16 +33,6 @@ SAME = {
     "right nose wing": "9.2",
 }
 """Points by rule, and the feature points that lie about there."""
-
-
-@pytest.fixture(scope="module")
-def mine(source: AnimatableFace) -> PreparedFace:
-    return prepare(source.scene, source.feature_points, "source")
-
-
-@pytest.fixture(scope="module")
-def yours(wide: tuple[FaceScene, FeaturePoints]) -> PreparedFace:
-    return prepare(*wide, "target")
 
 
 def test_rules_find_the_parts_of_a_face(mine: PreparedFace, yours: PreparedFace) -> None:

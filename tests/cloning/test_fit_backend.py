@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from cloning import clone_shapes
 from cloning.backends import find_backend
@@ -23,11 +22,6 @@ from samples.build.makehuman import open_makehuman
 from samples.build.phenotypes import decimated, known, phenotype_a, phenotype_mean
 
 UNITS = ("jawOpen", "mouthSmileLeft", "eyeBlinkLeft", "browInnerUp", "mouthFunnel", "mouthUpperUpLeft")
-
-
-@pytest.fixture(scope="module")
-def mine(source: AnimatableFace) -> PreparedFace:
-    return prepare(source.scene, source.feature_points, "source")
 
 
 def test_a_clone_onto_the_same_face_moves_as_the_source(source: AnimatableFace, mine: PreparedFace) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
+from sheets import cells, grid, halves, held_border, offsets
 
 from cloning.deformation import deformation_transfer
 from cloning.prepare import prepare
@@ -20,51 +21,23 @@ Polygons = tuple[Ints, Ints]
 
 def quads(n: int) -> Polygons:
     """The n x n grid's quadrangles."""
-    corner = np.arange(n * n).reshape(n, n)
-    cells = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1).reshape(-1, 4)
-    return cells.ravel().astype(np.int32), 4 * np.arange(len(cells) + 1, dtype=np.int32)
+    return cells(n).ravel(), 4 * np.arange(len(cells(n)) + 1, dtype=np.int32)
 
 
 def triangles(n: int) -> Polygons:
-    cells = quads(n)[0].reshape(-1, 4)
-    halves = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
-    return halves.ravel().astype(np.int32), 3 * np.arange(len(halves) + 1, dtype=np.int32)
+    return halves(n).ravel(), 3 * np.arange(len(halves(n)) + 1, dtype=np.int32)
 
 
 def mixed(n: int) -> Polygons:
     """Quadrangles; every third one as two triangles, and two neighbours as one hexagon."""
-    cells = [list(c) for c in quads(n)[0].reshape(-1, 4)]
-    first, second = cells[0], cells[n - 1]
+    four = [list(c) for c in cells(n)]
+    first, second = four[0], four[n - 1]
     out = [[first[0], first[1], second[1], second[2], second[3], first[3]]]
-    for k, c in enumerate(cells):
+    for k, c in enumerate(four):
         if k not in (0, n - 1):
             out += [[c[0], c[1], c[2]], [c[0], c[2], c[3]]] if k % 3 == 0 else [c]
     lengths = [len(c) for c in out]
     return np.concatenate(out).astype(np.int32), np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
-
-
-def grid(n: int, seed: int, rough: float = 0.15) -> Floats:
-    """A curved, uneven square of n x n vertices."""
-    random = np.random.default_rng(seed)
-    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-1.0, 1.0, n), np.linspace(-1.0, 1.0, n), indexing="ij"))
-    vertices = np.stack([x, y, 0.4 * np.cos(2.0 * x) * np.cos(y)], axis=1)
-    inside = np.abs(vertices[:, :2]).max(axis=1, keepdims=True) < 0.999
-    uneven: Floats = vertices + inside * rough / n * random.normal(size=vertices.shape)
-    return uneven
-
-
-def offsets(vertices: Floats, count: int, seed: int) -> Floats:
-    """(n, K, 3) smooth motions that rest at the border."""
-    random = np.random.default_rng(seed)
-    border = np.clip(2.0 - 2.0 * np.abs(vertices[:, :2]).max(axis=1), 0.0, 1.0)
-    waves = np.sin(vertices @ random.normal(size=(3, count)) * 2.0)
-    moved: Floats = (border[:, None] * waves)[:, :, None] * random.normal(size=(count, 3)) * 0.3
-    return moved
-
-
-def held_border(vertices: Floats) -> Floats:
-    held: Floats = (np.abs(vertices[:, :2]).max(axis=1) > 0.999).astype(float)
-    return held
 
 
 def rings_by_hand(polygons: Polygons, n: int) -> tuple[list[list[int]], list[list[tuple[int, int]]]]:
@@ -213,7 +186,7 @@ def test_tents_and_triangles_agree_where_motion_is_smooth() -> None:
     motion = offsets(source, 2, 14)
     still = held_border(source)
     by_tents = tent_transfer(source, target, quads(30), still).apply(motion)
-    by_triangles = deformation_transfer(source, target, triangles(30)[0].reshape(-1, 3), still).apply(motion)
+    by_triangles = deformation_transfer(source, target, halves(30), still).apply(motion)
     assert np.linalg.norm(by_tents - by_triangles) < 0.1 * np.linalg.norm(by_triangles)
 
 

@@ -9,32 +9,21 @@ import pytest
 
 from cloning.backends import find_backend
 from cloning.local_transfer import BareTransfer, GoalTransfer
-from cloning.prepare import PreparedFace, prepare
+from cloning.prepare import PreparedFace
 from cloning.resampling import resample
 from cloning.source import source_motions
 from cloning.transfer import build_face_transfer
 from cloning.vtc_image import Transferred, build_published, transferred
 from fat import AnimatableFace
-from fba import FaceScene, FeaturePoints
 from fba.arrays import Floats
 
 FEW = (3, 5, 12, 19, 31)
 
 
 @pytest.fixture(scope="module")
-def mine(source: AnimatableFace) -> PreparedFace:
-    return prepare(source.scene, source.feature_points, "source")
-
-
-@pytest.fixture(scope="module")
 def motions(source: AnimatableFace, mine: PreparedFace) -> Floats:
     """(n, K, 3) a few motions of the source's skin."""
     return np.stack([mine.skin.join(m.offsets) for m in source_motions(source, frozenset(FEW))], axis=1)
-
-
-@pytest.fixture(scope="module")
-def yours(wide: tuple[FaceScene, FeaturePoints]) -> PreparedFace:
-    return prepare(*wide, "target")
 
 
 def test_feature_points_are_near_before_the_correction_and_exact_after_it(

@@ -5,18 +5,14 @@ from __future__ import annotations
 import base64
 import io
 import json
-import os
-import shutil
 import subprocess
-import threading
 from dataclasses import dataclass, replace
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from browser import MODULES, open_page, program
 from faces import small_face
 from PIL import Image
 
@@ -28,7 +24,6 @@ from formats import gltf, read_face, write
 from formats.fap import read_fap
 from samples import sample
 
-MODULES = Path(__file__).parent / "node_modules"
 pytestmark = pytest.mark.peer
 
 VALIDATE = """
@@ -124,42 +119,9 @@ main().catch((e) => ({ failed: String(e.stack ?? e) })).then((result) =>
 """
 
 
-class _Handler(SimpleHTTPRequestHandler):
-    """Serves the page, the files and three.js; takes the page's result."""
-
-    def __init__(self, *args: Any, folder: Path, results: list[dict[str, Any]], done: threading.Event) -> None:
-        self.results, self.done = results, done
-        super().__init__(*args, directory=str(folder))
-
-    def translate_path(self, path: str) -> str:
-        if path.startswith("/node_modules/three/"):
-            return str(MODULES.parent / path.split("?")[0].lstrip("/"))
-        return super().translate_path(path)
-
-    def do_POST(self) -> None:
-        self.results.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
-        self.send_response(204)
-        self.end_headers()
-        self.done.set()
-
-    def log_message(self, *_: Any) -> None:
-        pass
-
-
-def _program(module: str, *names: str) -> str:
-    """Path of a program that needs an npm package; skips where one is missing, fails under CI."""
-    path = next(filter(None, map(shutil.which, names)), None)
-    if path is None or not (MODULES / module).is_dir():
-        message = f"needs {names[0]} and {module} (run 'npm ci' in tests/peers)"
-        if os.environ.get("CI"):
-            pytest.fail(message)
-        pytest.skip(message)
-    return path
-
-
 def validate(*files: Path) -> dict[str, Any]:
     """What the Khronos validator says of files, by their names."""
-    node = _program("gltf-validator", "node")
+    node = program("gltf-validator", "node")
     words = [node, "-e", VALIDATE, *map(str, files)]
     done = subprocess.run(words, cwd=MODULES.parent, capture_output=True, text=True, check=True, timeout=120)
     found: dict[str, Any] = json.loads(done.stdout)
@@ -168,28 +130,9 @@ def validate(*files: Path) -> dict[str, Any]:
 
 def three(jobs: list[dict[str, Any]], folder: Path) -> dict[str, Any]:
     """Play files of a folder in three.js and return what the page found."""
-    chromium = _program("three", "chromium", "google-chrome")
     (folder / "index.html").write_text(PAGE)
     (folder / "jobs.json").write_text(json.dumps(jobs))
-    results: list[dict[str, Any]] = []
-    done = threading.Event()
-    handler = partial(_Handler, folder=folder, results=results, done=done)
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    flags = ["--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    flags += ["--no-first-run", "--disable-background-networking", f"--user-data-dir={folder / 'profile'}"]
-    browser = subprocess.Popen(
-        [chromium, *flags, f"http://127.0.0.1:{server.server_port}/index.html"],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
-    )  # fmt: skip
-    try:
-        assert done.wait(90), "the page in Chromium gave no result within 90 s"
-    finally:
-        browser.terminate()
-        browser.wait(20)
-        server.shutdown()
-        server.server_close()
-    return results[0]
+    return open_page("three", folder)
 
 
 def png() -> bytes:

@@ -5,27 +5,21 @@ from __future__ import annotations
 import base64
 import io
 import json
-import os
-import shutil
-import subprocess
-import threading
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from browser import open_page
 from faces import small_face
 from PIL import Image
 
 from fat import AnimatableFace
 from formats import write
 
-X_ITE = Path(__file__).parent / "node_modules" / "x_ite" / "dist"
 pytestmark = pytest.mark.peer
 
-PAGE = """<!DOCTYPE html><html><head><meta charset="utf-8"><script src="/x_ite/x_ite.min.js"></script>
+PAGE = """<!DOCTYPE html><html><head><meta charset="utf-8"><script src="/node_modules/x_ite/dist/x_ite.min.js"></script>
 <style>x3d-canvas { width: 400px; height: 400px; }</style></head><body>
 <x3d-canvas splashScreen="false" notifications="false" contextMenu="false"></x3d-canvas>
 <script>
@@ -62,69 +56,16 @@ main().catch((e) => ({ failed: String(e) })).then((result) =>
 """
 
 
-class _Handler(SimpleHTTPRequestHandler):
-    """Serves the page, the file and X_ITE; takes the page's result."""
-
-    def __init__(self, *args: Any, folder: Path, results: list[dict[str, Any]], done: threading.Event) -> None:
-        self.results, self.done = results, done
-        super().__init__(*args, directory=str(folder))
-
-    def translate_path(self, path: str) -> str:
-        if path.startswith("/x_ite/"):
-            return str(X_ITE / path.removeprefix("/x_ite/").split("?")[0])
-        return super().translate_path(path)
-
-    def do_POST(self) -> None:
-        self.results.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
-        self.send_response(204)
-        self.end_headers()
-        self.done.set()
-
-    def log_message(self, *_: Any) -> None:
-        pass
-
-
-@pytest.fixture
-def chromium() -> str:
-    path = shutil.which("chromium") or shutil.which("google-chrome")
-    if path is None or not X_ITE.is_dir():
-        message = "needs Chromium and X_ITE (run 'npm ci' in tests/peers)"
-        if os.environ.get("CI"):
-            pytest.fail(message)
-        pytest.skip(message)
-    return path
-
-
-def open_in_browser(chromium: str, face: AnimatableFace, folder: Path) -> dict[str, Any]:
+def open_in_browser(face: AnimatableFace, folder: Path) -> dict[str, Any]:
     """Load a face in X_ITE and return what the page found."""
     write(face, folder / "face.wrl")
     (folder / "index.html").write_text(PAGE)
-    results: list[dict[str, Any]] = []
-    done = threading.Event()
-    handler = partial(_Handler, folder=folder, results=results, done=done)
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    names = json.dumps([s.name for s in face.scene.shapes])
-    address = f"http://127.0.0.1:{server.server_port}/index.html?names={names}"
-    flags = ["--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    flags += ["--no-first-run", "--disable-background-networking", f"--user-data-dir={folder / 'profile'}"]
-    browser = subprocess.Popen(
-        [chromium, *flags, address], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
-    try:
-        assert done.wait(90), "the page in Chromium gave no result within 90 s"
-    finally:
-        browser.terminate()
-        browser.wait(20)
-        server.shutdown()
-        server.server_close()
-    return results[0]
+    return open_page("x_ite", folder, f"?names={json.dumps([s.name for s in face.scene.shapes])}")
 
 
-def test_browser_shows_the_face_and_holds_its_tables(chromium: str, tmp_path: Path) -> None:
+def test_browser_shows_the_face_and_holds_its_tables(tmp_path: Path) -> None:
     face = small_face()
-    found = open_in_browser(chromium, face, tmp_path)
+    found = open_in_browser(face, tmp_path)
     assert "failed" not in found, found
     assert not [line for line in found["said"] if "face.png" not in line]
     for shape in face.scene.shapes:
