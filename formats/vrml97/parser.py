@@ -40,6 +40,8 @@ MAX_DEPTH = 128
 MAX_ITEMS = 1_000_000
 """Nodes, fields, strings and Booleans in one file (numbers are not counted): bounds the memory of the tree."""
 
+# An item that can fail half-way is repeated as `(?:(?>item))+`: Python below 3.11.5 forgets to go back when the last
+# round of `(?:item)++` fails.
 _BLANK = r"(?:[ \t\n\r\f\v,]++|#[^\n]*+)*+"
 _REAL = r"(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
 _END = r"(?=[ \t\n\r\f\v,#\[\]{}\"]|\Z)"
@@ -47,13 +49,13 @@ _NUMBER = rf"(?:[+-]?0[xX][0-9a-fA-F]++|[+-]?{_REAL}|[+-]I){_END}"
 _space = re.compile(_BLANK)
 _comment = re.compile(r"#[^\n]*+")
 _plain_list = re.compile(r"[0-9eE+\-. \t\n,]*+(?=\])")
-_run = re.compile(rf"(?:{_NUMBER}{_BLANK})++")
+_run = re.compile(rf"(?:(?>{_NUMBER}{_BLANK}))+")
 _id = re.compile(r"[^\x00-\x20\"#'+,\-.0-9\[\\\]{}\x7f][^\x00-\x20\"#',.\[\\\]{}\x7f]*+")
 _name = re.compile(r"[^\x00-\x20\"#,\[\]{}\x7f]++")
 _string = re.compile(r'"([^"\\]*+(?:\\.[^"\\]*+)*+)"', re.DOTALL)
 _escape = re.compile(r"\\(.)", re.DOTALL)
 _word = re.compile(r"[^\x00-\x20,#\"{}\[\]]++")
-_between_braces = re.compile(r'(?:[^{}\[\]"#]++|"[^"\\]*+(?:\\.[^"\\]*+)*+"|#[^\n]*+)++', re.DOTALL)
+_between_braces = re.compile(r'(?:(?>[^{}\[\]"#]++|"[^"\\]*+(?:\\.[^"\\]*+)*+"|#[^\n]*+))+', re.DOTALL)
 _CHUNK = 1 << 21
 _BULK = 1 << 12
 """Characters of numbers from which on reading them in bulk is faster than one by one."""

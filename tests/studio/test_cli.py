@@ -437,7 +437,11 @@ def test_output_that_standard_output_cannot_take() -> None:
 @pytest.mark.parametrize("delay", [0.05, 0.9])
 def test_an_interrupt_ends_quietly_and_leaves_nothing(tmp_path: Path, delay: float) -> None:
     # The interpreter's own start-up is over when this line appears; the packages are still to be loaded.
-    code = "import sys; from studio.cli import main; print('here', flush=True); main()"
+    # A shell starts what runs in the background with interrupts ignored; this program is to have them.
+    code = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "from studio.cli import main; print('here', flush=True); main()"
+    )
     words = ["clone", str(sample("faces/quad_head.obj")), "-o", str(tmp_path / "o.wrl")]
     with subprocess.Popen(
         [sys.executable, "-c", code, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
