@@ -35,6 +35,8 @@ class Format:
     carries_tables : a face written to it reads back with its Facial Animation Tables.
     names_images : its files name the images of materials, which then lie beside them.
     carries_streams : its writer takes a FAP stream as third argument and makes it the file's animation.
+    portable : its module also has ``write_portable(face, path, stream)`` for clients that know no MPEG-4 nodes; the
+        face plays there, its tables do not come back. The stream may be None.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Format:
     carries_tables: bool = False
     names_images: bool = False
     carries_streams: bool = False
+    portable: bool = False
 
 
 _FORMATS: list[Format] = []
@@ -122,26 +125,41 @@ def read_face(path: str | Path) -> AnimatableFace:
     )
 
 
-def write(face: FaceScene | AnimatableFace, path: str | Path, stream: FapStream | None = None) -> None:
+def write(
+    face: FaceScene | AnimatableFace, path: str | Path, stream: FapStream | None = None, *, portable: bool = False
+) -> None:
     """Write a face; the extension chooses the format. The file is written whole or not at all.
 
     Images that materials name are put beside it, where the format does not hold them and they are not there yet.
 
     stream : becomes the file's animation.
+    portable : for clients of the format that know no MPEG-4 nodes.
 
     Raises
     ------
     UnsupportedFeatureError
-        If there is a stream, but the format has no animation, or the face no tables.
+        If there is a stream, but the format has no animation, or the face no tables; if the format has no portable
+        form.
     """
     path = Path(path)
     entry = format_of(path, writing=True)
     scene = face.scene if isinstance(face, AnimatableFace) else face
-    if stream is not None and not entry.carries_streams:
-        known = ", ".join(e for f in _FORMATS if f.carries_streams for e in f.extensions)
+    if portable and not entry.portable:
+        raise UnsupportedFeatureError(
+            f"{path}: {entry.name} has no portable form; choose one of {_extensions(lambda f: f.portable)}"
+        )
+    if stream is not None and not (entry.carries_streams or portable):
+        known = _extensions(lambda f: f.carries_streams)
         raise UnsupportedFeatureError(f"{path}: {entry.name} is written without animation; choose one of {known}")
     if stream is not None and scene is face:
         raise UnsupportedFeatureError(f"'{scene.name}' has no Facial Animation Tables, so a FAP stream cannot move it")
-    _load(entry, "write")(*((face, path) if stream is None else (face, path, stream)))
+    if portable:
+        _load(entry, "write_portable")(face, path, stream)
+    else:
+        _load(entry, "write")(*((face, path) if stream is None else (face, path, stream)))
     if entry.names_images:
         place_textures(scene, path.parent)
+
+
+def _extensions(of: Callable[[Format], bool]) -> str:
+    return ", ".join(e for f in _FORMATS if of(f) for e in f.extensions)

@@ -23,34 +23,38 @@ def export(
     profile: Annotated[
         str,
         typer.Option(
-            help="native: everything the tables say, in the format's own terms; arkit, oculus, vrm: the shapes of "
-            "that name, to .npz, .usda, .usdc, .glb, .gltf or a folder of OBJ."
+            help="native: everything the tables say, in the format's own terms; portable: for programs that know "
+            "no MPEG-4 nodes (VRML, USD); arkit, oculus, vrm: the shapes of that name, to .npz, .usda, .usdc, .glb, "
+            ".gltf or a folder of OBJ."
         ),
     ] = "native",
     open_jaw: OpenJaw = None,
     stream: Annotated[
         Path | None,
-        typer.Option(help="A .fap stream that becomes the animation of OUT (glTF); 'demo' names the shipped one."),
+        typer.Option(help="A .fap stream that becomes the animation of OUT; 'demo' names the shipped one."),
     ] = None,
 ) -> None:
     """Write a face in another format; its tables go along where the format can carry them."""
     from fat.profiles import PROFILES
 
-    if profile == "native":
-        _export_face(face, output, open_jaw, stream)
+    if profile in ("native", "portable"):
+        _export_face(face, output, open_jaw, stream, portable=profile == "portable")
         return
     if stream is not None:
-        usage(f"--stream goes with the native profile; the shapes of '{profile}' are written without animation")
+        usage(f"--stream goes with the native and portable profiles; the shapes of '{profile}' stay still")
     if open_jaw is not None:
-        usage(f"--open-jaw goes with the native profile; the shapes of '{profile}' open the mouth in their own way")
+        usage(
+            f"--open-jaw goes with the native and portable profiles; the shapes of '{profile}' open the mouth in "
+            "their own way"
+        )
     chosen = next((p for p in PROFILES if p == profile), None)
     if chosen is None:
-        usage(f"--profile: there is no profile '{profile}'; known: native, {', '.join(PROFILES)}")
+        usage(f"--profile: there is no profile '{profile}'; known: native, portable, {', '.join(PROFILES)}")
     else:
         _export_profile(face, output, chosen)
 
 
-def _export_face(face: Path, output: Path, open_jaw: Mode | None, stream: Path | None) -> None:
+def _export_face(face: Path, output: Path, open_jaw: Mode | None, stream: Path | None, *, portable: bool) -> None:
     from fat.face import AnimatableFace
     from formats import format_of, read, write
     from formats.fap import read_fap
@@ -71,7 +75,7 @@ def _export_face(face: Path, output: Path, open_jaw: Mode | None, stream: Path |
     if stream is not None:
         frames, remarks = read_fap(sample("streams/demo.fap") if str(stream) == "demo" else stream)
         said += remarks
-    write(found, output, frames)
+    write(found, output, frames, portable=portable)
     out = console()
     print_findings([*said, *left_behind(scene_of(found), face, output)], out)
     if isinstance(found, AnimatableFace) and not entry.carries_tables:

@@ -103,14 +103,14 @@ def test_a_stream_becomes_the_animation_of_a_gltf(tmp_path: Path) -> None:
     assert (times["count"], times["max"]) == (150, [pytest.approx(149 / 25)])
     result = fba("export", tmp_path / "face.wrl", "-o", tmp_path / "face.ply", "--stream", "demo")
     assert result.exit_code == Outcome.BAD_INPUT
-    assert "without animation" in result.stderr
+    assert "stay still" in result.stderr
 
 
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (("default", "-o", "o.npz", "--profile", "talking"), Outcome.USAGE, "known: native, arkit, oculus, vrm"),
-        (("default", "-o", "o.glb", "--profile", "arkit", "--stream", "demo"), Outcome.USAGE, "without animation"),
+        (("default", "-o", "o.npz", "--profile", "talking"), Outcome.USAGE, "known: native, portable, arkit, oculus, vrm"),
+        (("default", "-o", "o.glb", "--profile", "arkit", "--stream", "demo"), Outcome.USAGE, "stay still"),
         (("default", "-o", "o.wrl", "--profile", "arkit"), Outcome.USAGE, "folder of OBJ"),
         (("default", "-o", "none/o.npz", "--profile", "arkit"), Outcome.BAD_INPUT, "there is no folder"),
     ],
