@@ -103,7 +103,7 @@ def test_a_stream_becomes_the_animation_of_a_gltf(tmp_path: Path) -> None:
     assert (times["count"], times["max"]) == (150, [pytest.approx(149 / 25)])
     result = fba("export", tmp_path / "face.wrl", "-o", tmp_path / "face.ply", "--stream", "demo")
     assert result.exit_code == Outcome.BAD_INPUT
-    assert "stay still" in result.stderr
+    assert "without animation" in result.stderr
 
 
 @pytest.mark.parametrize(
