@@ -109,7 +109,11 @@ def test_a_stream_becomes_the_animation_of_a_gltf(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (("default", "-o", "o.npz", "--profile", "talking"), Outcome.USAGE, "known: native, portable, arkit, oculus, vrm"),
+        (
+            ("default", "-o", "o.npz", "--profile", "talking"),
+            Outcome.USAGE,
+            "known: native, portable, arkit, oculus, vrm",
+        ),
         (("default", "-o", "o.glb", "--profile", "arkit", "--stream", "demo"), Outcome.USAGE, "stay still"),
         (("default", "-o", "o.wrl", "--profile", "arkit"), Outcome.USAGE, "folder of OBJ"),
         (("default", "-o", "none/o.npz", "--profile", "arkit"), Outcome.BAD_INPUT, "there is no folder"),
