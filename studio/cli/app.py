@@ -10,6 +10,7 @@ from studio.cli.analogy import analogy
 from studio.cli.author import author
 from studio.cli.check import check
 from studio.cli.clone import clone
+from studio.cli.compare import compare
 from studio.cli.convert import convert
 from studio.cli.demo import demo
 from studio.cli.doctor import doctor
@@ -18,6 +19,7 @@ from studio.cli.inspect import inspect
 from studio.cli.landmarks import landmarks
 from studio.cli.outcome import guarded
 from studio.cli.play import play
+from studio.cli.spread import Spread
 
 app = typer.Typer(
     name="fba",
@@ -28,8 +30,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for verb in (demo, inspect, landmarks, clone, author, export, convert, play, check, analogy, doctor):
-    app.command()(guarded(verb))
+for verb in (demo, inspect, landmarks, clone, author, export, convert, play, check, compare, analogy, doctor):
+    app.command(cls=Spread)(guarded(verb))
 
 
 def _version(wanted: bool) -> None:

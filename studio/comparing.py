@@ -1,0 +1,404 @@
+"""Cloning grids: every source onto every target, by several backends, in pictures and numbers.
+
+After Pandzic (2001), figures 11 to 13: a row is one source on all targets, a column one target from all sources, and
+where the two are the same face it is shown as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from cloning import clone
+from cloning.surface import Surface, build_surface
+from fat.evaluate import Player, Pose
+from fat.face import AnimatableFace
+from fat.quality import edge_stretch, fap_error, fap_values, feature_point_motion, flips, truth_error
+from fba.arrays import Floats
+from fba.errors import FbaError
+from fba.feature_points import FeaturePoints
+from fba.findings import Finding
+from fba.scene import FaceScene, Role
+from formats import read, read_face
+from studio.inputs import points_of, scene_of
+from studio.render import Figure, Renderer, make_renderer
+from studio.sheet import GAP, PAPER, TALL, PosePick, Sheet, UInt8
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A face of the comparison.
+
+    Attributes
+    ----------
+    name : the file's, without its extension.
+    path : as given; two models of one path are one face.
+    neutral : what was read, a plain scene or a face with tables.
+    points : feature points in the file's axes; None where they have to be found.
+    """
+
+    name: str
+    path: str
+    neutral: FaceScene | AnimatableFace
+    points: FeaturePoints | None
+
+
+def read_model(path: str) -> Model:
+    """Read a face with or without tables; "default" is the shipped source."""
+    found = read(path)
+    return Model(path if path == "default" else Path(path).stem, path, found, points_of(found, Path(path), None))
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A backend, as repaired or as its paper has it."""
+
+    backend: str
+    as_published: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.backend} published" if self.as_published else self.backend
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One motion of one clone beside the source's.
+
+    Attributes
+    ----------
+    generation : 1 for a clone of the source; 2 for one that went from the source to the target, back and there again.
+    fp_error : difference of the FAP values that the feature points show, relative (0.01 = 1 %).
+    fp_largest : the largest of these differences, in FAP units.
+    flips, source_flips : percent of the moving skin triangles that turn over.
+    stretch, source_stretch : 99th percentile of |log(edge length after / before)|.
+    drift : relative L2 distance of the skin's motion from the first generation's; None for that one.
+    """
+
+    source: str
+    target: str
+    backend: str
+    as_published: bool
+    generation: int
+    motion: str
+    fp_error: float
+    fp_largest: float
+    flips: float
+    source_flips: float
+    stretch: float
+    source_stretch: float
+    drift: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What was measured, the pictures, and what went wrong."""
+
+    cells: tuple[Cell, ...]
+    sheet: Image.Image
+    findings: tuple[Finding, ...]
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain data for JSON: all cells, and the mean over sources, targets and motions for each way."""
+        return {"cells": [asdict(c) for c in self.cells], "means": [asdict(m) for m in self.means()]}
+
+    def means(self) -> list[Mean]:
+        """One line for each backend, mode and generation, in the order of the cells."""
+        groups: dict[tuple[str, bool, int], list[Cell]] = {}
+        for cell in self.cells:
+            groups.setdefault((cell.backend, cell.as_published, cell.generation), []).append(cell)
+        return [Mean.of(key, group) for key, group in groups.items()]
+
+
+@dataclass(frozen=True, slots=True)
+class Mean:
+    """Cells of one backend, mode and generation taken together; fields as in `Cell`."""
+
+    backend: str
+    as_published: bool
+    generation: int
+    cells: int
+    fp_error: float
+    flips: float
+    source_flips: float
+    stretch: float
+    source_stretch: float
+    drift: float | None
+
+    @classmethod
+    def of(cls, key: tuple[str, bool, int], cells: Sequence[Cell]) -> Mean:
+        """The mean of some cells; of what can be infinite, over the finite ones."""
+
+        def mean(name: str) -> float:
+            values = np.array([getattr(c, name) for c in cells], dtype=np.float64)
+            return float(values[np.isfinite(values)].mean()) if np.isfinite(values).any() else float("nan")
+
+        drift = None if any(c.drift is None for c in cells) else mean("drift")
+        return cls(
+            *key,
+            len(cells),
+            mean("fp_error"),
+            mean("flips"),
+            mean("source_flips"),
+            mean("stretch"),
+            mean("source_stretch"),
+            drift,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Actor:
+    """A face ready to be posed, measured and drawn."""
+
+    face: AnimatableFace
+    player: Player
+    skin: Surface
+    figure: Figure
+
+    @classmethod
+    def of(cls, face: AnimatableFace) -> _Actor:
+        names = [s.name for s in face.scene.with_role(Role.SKIN)]
+        skin = build_surface(face.scene, face.feature_points, names, face.fapu.es0)
+        return cls(face, Player(face), skin, Figure.of_face(face))
+
+    def pose(self, pick: PosePick) -> Pose:
+        return self.player.pose(pick.faps, pick.viseme, pick.expression)
+
+    def offsets(self, pose: Pose) -> dict[str, Floats]:
+        """What meshes do, without the transforms: shape name -> world offsets (n, 3)."""
+        scene = self.face.scene
+        return {
+            s.name: (pose.local[s.name] - s.mesh.vertices) @ scene.world_matrix(s.name)[:3, :3].T for s in scene.shapes
+        }
+
+    def draw(self, pose: Pose, width: int, renderer: Renderer) -> UInt8:
+        size = (width, round(TALL * width))
+        return self.figure.draw(pose.world_shapes(), size, self.figure.camera, renderer)
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """One pose of one face, measured."""
+
+    values: Mapping[int, float]
+    skin: Floats
+    flips: float
+    stretch: float
+
+    @classmethod
+    def of(cls, actor: _Actor, pose: Pose) -> _Motion:
+        face, skin = actor.face, actor.skin
+        offsets = actor.offsets(pose)
+        moved = skin.join(offsets) / face.fapu.es0
+        return cls(
+            fap_values(feature_point_motion(face.feature_points, offsets), face.fapu),
+            moved,
+            flips(skin.vertices, skin.triangles, moved),
+            edge_stretch(skin.vertices, skin.edges, moved),
+        )
+
+
+@dataclass(eq=False)
+class _Row:
+    label: str
+    pictures: list[list[UInt8]] = field(default_factory=list)
+    captions: list[list[str]] = field(default_factory=list)
+
+    def add(self, pictures: list[UInt8], captions: list[str]) -> None:
+        self.pictures.append(pictures)
+        self.captions.append(captions)
+
+
+def compare(
+    sources: Sequence[Model],
+    targets: Sequence[Model],
+    picks: Sequence[PosePick],
+    ways: Sequence[Way] = (Way("fit"),),
+    *,
+    generations: int = 1,
+    cell: int = 180,
+    renderer: Renderer | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Clone every source onto every target, and measure and draw the motions.
+
+    Parameters
+    ----------
+    sources : a source without tables first gets the shipped source's motion by the default backend.
+    picks : motions; each makes a grid of its own.
+    generations : how often a clone is made: the second one is cloned back onto the source's mesh and from there onto
+        the target again, and so on.
+    cell : width of one picture, pixels.
+    progress : called with (what is done, share done).
+
+    Returns
+    -------
+    A pair of faces that cannot be cloned leaves its cell empty, and a finding says why.
+    """
+    comparer = _Comparer(targets, picks, ways, generations, cell, renderer or make_renderer(), progress)
+    steps = len(sources) * (len(ways) * len(targets) * (2 * generations - 1) + 1)
+    comparer.steps = steps
+    for source in sources:
+        comparer.add(source)
+    return Comparison(tuple(comparer.cells), comparer.sheet(), tuple(comparer.findings))
+
+
+class _Comparer:
+    def __init__(
+        self,
+        targets: Sequence[Model],
+        picks: Sequence[PosePick],
+        ways: Sequence[Way],
+        generations: int,
+        cell: int,
+        renderer: Renderer,
+        progress: Progress | None,
+    ) -> None:
+        self.targets, self.picks, self.ways, self.generations = targets, picks, ways, generations
+        self.width, self.renderer, self.progress = cell, renderer, progress
+        self.faps = sorted({number for pick in picks for number, _ in pick.tables()})
+        self.cells: list[Cell] = []
+        self.rows: list[_Row] = []
+        self.findings: list[Finding] = []
+        self.steps, self.done = 1, 0
+
+    def add(self, source: Model) -> None:
+        """All clones of one source: a row for each way and generation."""
+        face = self._animatable(source)
+        lacking = [p.caption for p in self.picks if not p.tables() <= {t.key for t in face.tables}]
+        if lacking:
+            text = f"the source has no tables for all of {', '.join(lacking)}, so it shows what it has"
+            self.findings.append(Finding("warning", "motion-missing", text, source.name))
+        actor = _Actor.of(face)
+        poses = [actor.pose(pick) for pick in self.picks]
+        own = [_Motion.of(actor, pose) for pose in poses]
+        itself = [actor.draw(pose, self.width, self.renderer) for pose in poses]
+        for way in self.ways:
+            rows = [_Row(self._label(source, way, g)) for g in range(1, self.generations + 1)]
+            for target in self.targets:
+                if target.path == source.path:
+                    for row in rows:
+                        row.add(itself, ["source"] * len(itself))
+                    self._tell(f"{source.name}", 2 * self.generations - 1)
+                else:
+                    self._clone(source, face, target, way, own, rows)
+            self.rows += rows
+
+    def _label(self, source: Model, way: Way, generation: int) -> str:
+        parts = [source.name]
+        parts += [str(way)] if len(self.ways) > 1 or way.as_published else []
+        parts += [f"generation {generation}"] if self.generations > 1 else []
+        return ", ".join(parts)
+
+    def _animatable(self, model: Model) -> AnimatableFace:
+        if isinstance(model.neutral, AnimatableFace):
+            self._tell(model.name, 1)
+            return model.neutral
+        text = "the source has no tables; it moves as a clone of the shipped source"
+        self.findings.append(Finding("info", "source-cloned", text, model.name))
+        face = clone(read_face("default"), model.neutral, model.points, faps=self.faps)
+        self._tell(model.name, 1)
+        return face
+
+    def _clone(
+        self, source: Model, face: AnimatableFace, target: Model, way: Way, own: Sequence[_Motion], rows: Sequence[_Row]
+    ) -> None:
+        first: list[_Motion] = []
+        made = self._generations(face, target, way)
+        for generation, row in enumerate(rows, start=1):
+            try:
+                actor = _Actor.of(next(made))
+            except FbaError as error:
+                where = f"{source.name} onto {target.name}, {way}"
+                self.findings.append(Finding("error", "not-cloned", str(error), where))
+                for rest in rows[generation - 1 :]:
+                    rest.add([self._blank()] * len(self.picks), ["not cloned"] * len(self.picks))
+                return
+            poses = [actor.pose(pick) for pick in self.picks]
+            found = [_Motion.of(actor, pose) for pose in poses]
+            first = first or found
+            cells = [
+                _cell(source, target, way, generation, *parts)
+                for parts in zip(self.picks, own, found, first, strict=True)
+            ]
+            self.cells += cells
+            row.add([actor.draw(pose, self.width, self.renderer) for pose in poses], [_caption(c) for c in cells])
+
+    def _generations(self, face: AnimatableFace, target: Model, way: Way) -> Iterator[AnimatableFace]:
+        """The clone on the target; then, again and again, that one's clone on the source's mesh cloned once more."""
+        there = face
+        for generation in range(self.generations):
+            if generation:
+                there = clone(there, face, backend=way.backend, as_published=way.as_published, faps=self.faps)
+                self._tell(f"{target.name}, {way}", 1)
+            onto, points = target.neutral, target.points
+            there = clone(there, onto, points, backend=way.backend, as_published=way.as_published, faps=self.faps)
+            self._tell(f"{target.name}, {way}", 1)
+            yield there
+
+    def _tell(self, what: str, steps: int) -> None:
+        self.done += steps
+        if self.progress is not None:
+            self.progress(what, self.done / self.steps)
+
+    def _blank(self) -> UInt8:
+        picture: UInt8 = np.full((round(TALL * self.width), self.width, 3), PAPER, dtype=np.uint8)
+        return picture
+
+    def sheet(self) -> Image.Image:
+        """The targets at rest, and below them a grid for each motion."""
+        out = Sheet()
+        neutral = [self._neutral(target) for target in self.targets]
+        out.add_row("target", neutral, [target.name for target in self.targets])
+        for k, pick in enumerate(self.picks):
+            for number, row in enumerate(self.rows):
+                label = f"{pick.caption}: {row.label}" if len(self.picks) > 1 else row.label
+                pictures = [pictures[k] for pictures in row.pictures]
+                captions = [captions[k] for captions in row.captions]
+                out.add_row(label, pictures, captions, space_before=GAP if number else 3 * GAP)
+        out.title = ", ".join(pick.caption for pick in self.picks)
+        return out.image()
+
+    def _neutral(self, model: Model) -> UInt8:
+        scene = scene_of(model.neutral)
+        figure = Figure(scene, model.points)
+        size = (self.width, round(TALL * self.width))
+        return figure.draw(None, size, figure.camera, self.renderer)
+
+
+def _cell(
+    source: Model,
+    target: Model,
+    way: Way,
+    generation: int,
+    pick: PosePick,
+    own: _Motion,
+    found: _Motion,
+    first: _Motion,
+) -> Cell:
+    error = fap_error(own.values, found.values)
+    return Cell(
+        source.name,
+        target.name,
+        way.backend,
+        way.as_published,
+        generation,
+        pick.caption,
+        error.relative,
+        error.largest,
+        found.flips,
+        own.flips,
+        found.stretch,
+        own.stretch,
+        truth_error(found.skin, first.skin) if generation > 1 else None,
+    )
+
+
+def _caption(cell: Cell) -> str:
+    drift = "" if cell.drift is None else f", drift {cell.drift:.2f}"
+    return f"FP {100 * cell.fp_error:.1f} %, flips {cell.flips:.1f} %{drift}"

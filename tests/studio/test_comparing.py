@@ -1,0 +1,121 @@
+"""``fba compare``: grids of clones, their measures, and the names of motions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner, Result
+
+from fat.evaluate import Player
+from fba.amplitudes import amplitudes
+from fba.errors import FapStreamError
+from fba.faps import faps
+from formats import read_face
+from samples import sample
+from studio.cli.app import app
+from studio.cli.outcome import Outcome
+from studio.motions import COMBINATIONS, parse_motions
+from studio.render import Figure, make_renderer
+
+HEAD = sample("faces/tri_head.obj")
+
+
+def fba(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def test_motions_have_names() -> None:
+    joy, ih, also_ih, faps_ = parse_motions("joy, viseme_ih,viseme_12,open_jaw=800+37+32=-5.5")
+    assert (joy.caption, joy.expression) == ("joy", (1, 63, 0, 0))
+    assert ih.viseme == also_ih.viseme == (12, 0, 63)
+    assert faps_.faps == {3: 800.0, 37: amplitudes()[37].positive, 32: -5.5}
+
+
+@pytest.mark.parametrize("text", ["", " , ", "smirk", "viseme_42", "open_jaw=wide", "69", "joy=5", "open_jaw+"])
+def test_what_is_no_motion_is_named(text: str) -> None:
+    with pytest.raises(FapStreamError, match=r"no motion"):
+        parse_motions(text)
+
+
+def test_the_combination_is_the_papers() -> None:
+    """Every FAP of the lips but the corners' raises at -400, jaw 800, corners stretched 150, left brow 300."""
+    pose = COMBINATIONS["combination"].faps
+    by_name = {f.name: pose.get(f.id) for f in faps()}
+    lips = [n for n in by_name if n.startswith(("raise_", "lower_")) and "lip" in n and "corner" not in n]
+    assert len(lips) == 12
+    assert {by_name[n] for n in lips} == {-400.0}
+    assert by_name["open_jaw"] == 800.0
+    assert (by_name["stretch_l_cornerlip"], by_name["stretch_r_cornerlip"]) == (150.0, 150.0)
+    assert [n for n, v in by_name.items() if v == 300.0] == [f"raise_l_{k}_eyebrow" for k in "imo"]
+    assert len(pose) == 18
+
+
+@pytest.fixture(scope="module")
+def grid(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    out = tmp_path_factory.mktemp("grid") / "grid.png"
+    result = fba(
+        *("compare", "default", "--targets", HEAD, "default", "-o", out, "--motion", "open_jaw=500,31=100"),
+        *("--backends", "fmc", "--generations", 2, "--cell", 60, "--json"),
+    )
+    assert result.exit_code == Outcome.OK, result.output
+    return json.loads(result.stdout), out
+
+
+def test_every_pair_and_motion_is_measured(grid: tuple[dict[str, Any], Path]) -> None:
+    cells = grid[0]["cells"]
+    named = {(c["source"], c["target"], c["backend"], c["generation"], c["motion"]) for c in cells}
+    assert named == {("default", "tri_head", "fmc", g, m) for g in (1, 2) for m in ("open_jaw=500", "31=100")}
+    assert all(c["fp_error"] < 0.01 and c["flips"] < 1.0 for c in cells)
+    means = {m["generation"]: m for m in grid[0]["means"]}
+    assert means[1]["fp_error"] == pytest.approx(np.mean([c["fp_error"] for c in cells if c["generation"] == 1]))
+
+
+def test_a_clone_of_a_clones_clone_stays_near_the_first(grid: tuple[dict[str, Any], Path]) -> None:
+    drifts = {c["generation"]: c["drift"] for c in grid[0]["cells"]}
+    assert drifts[1] is None
+    assert 0.0 < drifts[2] < 0.15
+
+
+def test_the_picture_holds_a_grid_for_each_motion(grid: tuple[dict[str, Any], Path]) -> None:
+    """The source's own column is the source itself, bit by bit, in every generation."""
+    image = np.asarray(Image.open(grid[1]))
+    face = read_face("default")
+    figure = Figure.of_face(face)
+    for value in ({3: 500.0}, {31: 100.0}):
+        pose = Player(face).pose(value)
+        own = figure.draw(pose.world_shapes(), (60, 72), figure.camera, make_renderer())
+        windows = np.lib.stride_tricks.sliding_window_view(image[:, -74:-14], own.shape, axis=(0, 1, 2))[:, 0, 0]  # type: ignore[call-overload]
+        assert (windows == own).all(axis=(1, 2, 3)).sum() == 2
+
+
+def test_a_pair_that_cannot_be_cloned_is_a_finding(tmp_path: Path) -> None:
+    flat = tmp_path / "flat.obj"
+    flat.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    result = fba("compare", "default", "--targets", flat, "-o", tmp_path / "g.png", "--motion", "open_jaw", "--json")
+    assert result.exit_code == Outcome.FINDINGS, result.output
+    found = json.loads(result.stdout)
+    assert found["cells"] == found["means"] == []
+    assert [f["where"] for f in found["findings"]] == ["default onto flat, fit"]
+    assert (tmp_path / "g.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("default", "-o", "g.png"), Outcome.USAGE, "--targets"),
+        (("default", "--targets", HEAD, "-o", "g.jpg"), Outcome.USAGE, "a .png"),
+        (("default", "--targets", HEAD, "-o", "g.png", "--backends", "fit,magic"), Outcome.USAGE, "backend 'magic'"),
+        (("default", "--targets", HEAD, "-o", "g.png", "--motion", "smirk"), Outcome.BAD_INPUT, "'smirk' is no motion"),
+        (("default", "--targets", "no.obj", "-o", "g.png"), Outcome.BAD_INPUT, "no.obj"),
+    ],
+)
+def test_wrong_use_says_what_to_do(tmp_path: Path, words: tuple[object, ...], code: int, said: str) -> None:
+    result = fba("compare", *(tmp_path / w if str(w).startswith("g.") else w for w in words))
+    assert result.exit_code == code, result.output
+    assert said in result.stderr
+    assert list(tmp_path.iterdir()) == []
