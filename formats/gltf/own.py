@@ -23,7 +23,7 @@ from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.mesh import Material, PolyMesh
 from fba.scene import FaceScene, Frame, Node, Role, Shape, Transform
 from formats.gltf.buffers import Buffer, Json
-from formats.gltf.targets import table_borders, target_name
+from formats.targets import table_borders, target_name
 
 FORMAT = "fba-gltf/1"
 KEY = "fba"

@@ -18,8 +18,8 @@ from fba.mesh import PolyMesh
 from fba.scene import Shape
 from formats.gltf.buffers import Buffer, Json, to_single
 from formats.gltf.materials import Materials
-from formats.gltf.targets import Target
 from formats.normals import SmoothNormals
+from formats.targets import Target
 
 VERTEX = "_VERTEX"
 """Attribute that says which vertex of the shape each vertex of a primitive is."""

@@ -14,9 +14,9 @@ from fba.shapes import ShapeSet
 from formats.gltf.data import GltfData, Json
 from formats.gltf.own_reader import own_json, read_unchanged
 from formats.gltf.primitives import split
-from formats.gltf.targets import Target
 from formats.gltf.writer import Draft
 from formats.matrices import into_shape
+from formats.targets import Target
 
 
 def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:

@@ -19,10 +19,11 @@ from fba.stream import FapStream
 from formats.files import atomic_output, write_bytes
 from formats.gltf.buffers import Buffer, Json, to_single
 from formats.gltf.materials import Materials
-from formats.gltf.nodes import PATHS, Nodes, driven_fields
+from formats.gltf.nodes import PATHS, Nodes
 from formats.gltf.own import FORMAT, KEY, Pack, face_json, scene_json
 from formats.gltf.primitives import write_mesh
-from formats.gltf.targets import Target, table_borders, table_targets, target_weights
+from formats.node_motion import driven_fields
+from formats.targets import Target, table_borders, table_targets, target_weights
 
 
 class Draft:

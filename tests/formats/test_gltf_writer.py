@@ -28,12 +28,13 @@ from formats import gltf, obj, read, read_face, write
 from formats.gltf.buffers import Buffer, to_single
 from formats.gltf.colors import from_linear, to_linear
 from formats.gltf.data import GltfData
-from formats.gltf.nodes import Nodes, quaternion_of
+from formats.gltf.nodes import Nodes
 from formats.gltf.own import Pack, Unpack
 from formats.gltf.own_reader import CHANGED
 from formats.gltf.primitives import split
-from formats.gltf.targets import border_weights, table_borders, table_targets, target_weights
+from formats.node_motion import quaternion_of
 from formats.shapes import read_shapes
+from formats.targets import border_weights, table_borders, table_targets, target_weights
 from formats.textures import place_textures, texture_bytes
 
 PNG = base64.b64decode(
