@@ -13,7 +13,7 @@ from typer.testing import CliRunner, Result
 
 from fat.evaluate import Player
 from fba.amplitudes import amplitudes
-from fba.errors import FapStreamError
+from fba.errors import FapStreamError, LandmarkError
 from fba.faps import faps
 from formats import read_face
 from samples import sample
@@ -93,14 +93,30 @@ def test_the_picture_holds_a_grid_for_each_motion(grid: tuple[dict[str, Any], Pa
         assert (windows == own).all(axis=(1, 2, 3)).sum() == 2
 
 
-def test_a_pair_that_cannot_be_cloned_is_a_finding(tmp_path: Path) -> None:
-    flat = tmp_path / "flat.obj"
-    flat.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    result = fba("compare", "default", "--targets", flat, "-o", tmp_path / "g.png", "--motion", "open_jaw", "--json")
+def test_a_pair_that_cannot_be_cloned_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise LandmarkError("no face was found in it")
+
+    monkeypatch.setattr("studio.comparing.clone", refuse)
+    words = (
+        "--targets",
+        HEAD,
+        "default",
+        "-o",
+        tmp_path / "g.png",
+        "--motion",
+        "open_jaw",
+        "--generations",
+        2,
+        "--json",
+    )
+    result = fba("compare", "default", *words)
     assert result.exit_code == Outcome.FINDINGS, result.output
     found = json.loads(result.stdout)
     assert found["cells"] == found["means"] == []
-    assert [f["where"] for f in found["findings"]] == ["default onto flat, fit"]
+    assert [(f["where"], f["message"]) for f in found["findings"]] == [
+        ("default onto tri_head, fit", "no face was found in it")
+    ]
     assert (tmp_path / "g.png").exists()
 
 
