@@ -3,6 +3,8 @@
 Every reader must end with a result or an FbaError, soon and in little memory. With ``--atheris`` (pip install atheris)
 the mutations are led by coverage; otherwise files are mutated at random from a seed, which needs nothing. What falls
 out is written to a folder, one file a find; it belongs into the tests then.
+
+The toolkit is imported inside functions: coverage is seen only in modules that are imported under atheris' eyes.
 """
 
 from __future__ import annotations
@@ -21,8 +23,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from benchmarks.fuzz_mutations import mutated
-from benchmarks.fuzz_seeds import OBJ, scene_seeds, stream_seeds
-from fba.errors import FbaError
 
 Target = Callable[[bytes], object]
 
@@ -64,6 +64,7 @@ SCENES = ("bt", "glb", "gltf", "mtl", "obj", "off", "ply", "stl", "usda", "wfm",
 
 def _scene(kind: str) -> Target:
     """A reader of scenes, fed through a file."""
+    from benchmarks.fuzz_seeds import OBJ
     from formats import read
 
     folder = Path(tempfile.mkdtemp(prefix="fuzz-"))
@@ -93,11 +94,15 @@ def target_of(kind: str) -> Target:
 
 def seeds(kind: str) -> list[bytes]:
     """Good files of a kind, small enough that mutations reach everything."""
+    from benchmarks.fuzz_seeds import scene_seeds, stream_seeds
+
     return stream_seeds(kind) if kind in STREAMS else scene_seeds(kind)
 
 
 def check(target: Target, data: bytes) -> str | None:
     """What is wrong with how a reader ends, or None."""
+    from fba.errors import FbaError
+
     start = time.monotonic()
     try:
         target(data)
@@ -188,7 +193,7 @@ def _words(files: list[bytes]) -> list[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("kinds", nargs="+", choices=kinds(), metavar="KIND", help=", ".join(kinds()))
+    parser.add_argument("kinds", nargs="+", choices=[*STREAMS, *SCENES])
     parser.add_argument("--minutes", type=float, default=1.0, help="for each kind")
     parser.add_argument("--folder", type=Path, default=Path("out/fuzz"), help="where finds go")
     parser.add_argument("--seed", type=int, default=1)
