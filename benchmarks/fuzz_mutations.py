@@ -139,7 +139,7 @@ def _change(owner: Any, key: Any, source: random.Random, places: list[_Place]) -
         owner[key] = value + source.choice((-2, -1, 1, 2, 100))
     elif kind == 3 and isinstance(value, str) and value.startswith("data:"):
         head, _, text = value.partition(",")
-        raw = bytearray(base64.b64decode(text + "=" * (-len(text) % 4)))
+        raw = bytearray(_decoded(text))
         for _ in range(source.choice((1, 4, 30))):
             if raw:
                 at = 4 * source.randrange(-(-len(raw) // 4))
@@ -149,3 +149,10 @@ def _change(owner: Any, key: Any, source: random.Random, places: list[_Place]) -
         owner[key] = value * source.choice((0, 2, 3)) if len(value) < 1000 else []
     else:
         owner[key] = source.choice(_ODD_VALUES)
+
+
+def _decoded(text: str) -> bytes:
+    try:
+        return base64.b64decode(text)
+    except ValueError:
+        return b"\0" * 64
