@@ -32,9 +32,7 @@ def read_text(path: Path) -> tuple[str, list[Finding]]:
     InputFileError
         If the file is missing, empty, cut off, too large, or not text.
     """
-    data = read_bytes(path, MAX_TEXT)
-    if data.startswith(_GZIP):
-        data = _gunzip(data, path)
+    data = read_unpacked(path)
     findings: list[Finding] = []
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputFileError(f"{path} is UTF-16 text; VRML97 is UTF-8: save it as UTF-8")
@@ -49,6 +47,18 @@ def read_text(path: Path) -> tuple[str, list[Finding]]:
             )
         )
     return text.replace("\r\n", "\n").replace("\r", "\n"), findings
+
+
+def read_unpacked(path: Path) -> bytes:
+    """Bytes of a text file, unpacked if they are gzip data.
+
+    Raises
+    ------
+    InputFileError
+        If the file is missing, empty, cut off or too large.
+    """
+    data = read_bytes(path, MAX_TEXT)
+    return _gunzip(data, path) if data.startswith(_GZIP) else data
 
 
 def write_text(text: str, path: Path) -> None:
