@@ -134,7 +134,7 @@ def _change(owner: Any, key: Any, source: random.Random, places: list[_Place]) -
     elif kind == 1:
         other, place = source.choice(places)
         if place in other if isinstance(other, dict) else place < len(other):
-            owner[key] = json.loads(json.dumps(other[place]))
+            owner[key] = _copy(other[place])
     elif kind == 2 and isinstance(value, int):
         owner[key] = value + source.choice((-2, -1, 1, 2, 100))
     elif kind == 3 and isinstance(value, str) and value.startswith("data:"):
@@ -146,9 +146,14 @@ def _change(owner: Any, key: Any, source: random.Random, places: list[_Place]) -
                 raw[at : at + 4] = source.choice((b"\0\0\0\0", b"\xff\xff\xff\xff", b"\0\0\x80\x7f", b"\1\0\0\0"))
         owner[key] = head + "," + base64.b64encode(bytes(raw)).decode()
     elif kind == 4 and isinstance(value, list):
-        owner[key] = value * source.choice((0, 2, 3)) if len(value) < 1000 else []
+        owner[key] = _copy(value * source.choice((0, 2, 3))) if len(value) < 1000 else []
     else:
-        owner[key] = source.choice(_ODD_VALUES)
+        owner[key] = _copy(source.choice(_ODD_VALUES))
+
+
+def _copy(value: Any) -> Any:
+    """The same, sharing nothing: a document that holds itself has no end."""
+    return json.loads(json.dumps(value))
 
 
 def _decoded(text: str) -> bytes:
