@@ -12,8 +12,11 @@ from fba.errors import FapStreamError
 from fba.findings import Finding
 from fba.stream import FapStream
 from formats.fap import range_findings
+from formats.fba_bitstream.corrections import packed
 from formats.fba_bitstream.decoder import Decoder
-from formats.fba_bitstream.encoder import Encoder, findings
+from formats.fba_bitstream.encoder import Encoder
+from formats.fba_bitstream.remarks import correction_findings, lossy_findings
+from formats.fba_bitstream.sequence import wrapped
 from formats.files import read_bytes, write_bytes
 
 __all__ = ["decode_fba", "encode_fba", "read_fba", "write_fba"]
@@ -67,12 +70,12 @@ def encode_fba(stream: FapStream, quantizer: int | None = None) -> tuple[bytes, 
     ----------
     quantizer : scale 0..31. 0 sends values as they are, which holds as long as they stay within 1860 of zero, or later
         of the frame before; otherwise values are rounded to multiples of the scale times the FAP's own step. None
-        takes 0 where that loses nothing, else 1.
+        loses nothing: it takes 0 where that is exact, else 1 and puts what is rounded away into user data.
 
     Returns
     -------
     data : the bitstream.
-    findings : what was rounded or cut.
+    findings : what was rounded or cut, or stands in user data.
 
     Raises
     ------
@@ -85,9 +88,9 @@ def encode_fba(stream: FapStream, quantizer: int | None = None) -> tuple[bytes, 
         raise FapStreamError(f"the stream '{stream.name}' has no frames; an FBA bitstream needs at least one")
     if quantizer is not None and not 0 <= quantizer <= 31:
         raise FapStreamError(f"the scale of the quantizer must be 0 to 31, not {quantizer}")
-    scale = quantizer or 0
-    encoder = Encoder(stream, scale)
-    if quantizer is None and not encoder.exact:
-        scale = 1
-        encoder = Encoder(stream, scale)
-    return encoder.encode(), [EXPERIMENTAL, *findings(encoder, stream, scale)]
+    plain = Encoder(stream, quantizer or 0)
+    if quantizer is not None or plain.exact:
+        return plain.encode(), [EXPERIMENTAL, *lossy_findings(plain, stream, quantizer or 0)]
+    rounded = Encoder(stream, 1)
+    data = wrapped(rounded.encode(), packed(rounded.corrections()))
+    return data, [EXPERIMENTAL, *correction_findings(plain, rounded, stream)]

@@ -7,20 +7,23 @@ import numpy as np
 from fba.errors import FapStreamError, UnsupportedFeatureError
 from fba.faps import FAP_COUNT, LOW_LEVEL_FAPS
 from fba.findings import Finding, Severity
-from fba.stream import EXPRESSION_FIELDS, VISEME_FIELDS, FapStream
+from fba.stream import FapStream
 from formats.fba_bitstream.arithmetic import RunDecoder
 from formats.fba_bitstream.bits import BitReader
+from formats.fba_bitstream.corrections import unpacked
+from formats.fba_bitstream.sequence import unwrapped
 from formats.fba_bitstream.syntax import (
     ALL,
+    COLUMNS,
     FACE,
     GROUPS,
     HELD,
     INTERPOLATED,
-    OBJECT_STARTS,
     PLAIN_BITS,
     PLANE_STARTS,
     QUANTIZER_BITS,
     RANGE_UNIT,
+    ROW,
     SEQUENCE_END,
     FieldKey,
     Ranges,
@@ -34,9 +37,6 @@ LARGEST_FRAMES = 100_000
 
 DEFAULT_RATE = 30.0
 _INT32 = 2**31
-_PLACES = {1: FAP_COUNT, 2: FAP_COUNT + len(VISEME_FIELDS)}
-"""Where the fields of FAP 1 and 2 stand in a row."""
-_ROW = FAP_COUNT + len(VISEME_FIELDS) + len(EXPRESSION_FIELDS)
 
 
 class Decoder:
@@ -45,6 +45,7 @@ class Decoder:
     def __init__(self, data: bytes, source: str) -> None:
         self._bits = BitReader(data, source)
         self._source = source
+        self._start, self._user_data = unwrapped(data, source)
         self._findings: dict[str, Finding] = {}
         self._rate: float | None = None
         self._segment: Segment | None = None
@@ -58,9 +59,7 @@ class Decoder:
 
     def decode(self, name: str) -> tuple[FapStream, list[Finding]]:
         """Read all planes."""
-        if self._bits.word_at(0) not in OBJECT_STARTS:
-            raise self._bits.error("there is no FBA object start code (00 00 01 BA); this is no FBA bitstream")
-        self._bits.position = 32
+        self._bits.position = 8 * self._start + 32
         numbers: list[int] = []
         rows: list[np.ndarray] = []
         masks: list[np.ndarray] = []
@@ -73,17 +72,38 @@ class Decoder:
             numbers.append(self._number)
         if not rows:
             raise FapStreamError(f"{self._source}: the bitstream holds no frames")
-        table = np.array(rows)
+        table = self._corrected(np.array(rows), np.array(masks))
         stream = FapStream(
             self._rate or DEFAULT_RATE,
             table[:, :FAP_COUNT],
             np.array(masks),
-            table[:, _PLACES[1] : _PLACES[2]],
-            table[:, _PLACES[2] :],
+            table[:, COLUMNS[1] : COLUMNS[2]],
+            table[:, COLUMNS[2] :],
             np.array(numbers),
             name,
         )
         return stream, list(self._findings.values())
+
+    def _corrected(self, table: np.ndarray, masks: np.ndarray) -> np.ndarray:
+        """Values with what user data says is missing."""
+        sent = np.ones(table.shape, dtype=np.bool_)
+        sent[:, :FAP_COUNT] = masks
+        sent[:, COLUMNS[1] : COLUMNS[2]] = masks[:, :1]
+        sent[:, COLUMNS[2] :] = masks[:, 1:2]
+        for data in self._user_data:
+            frames = unpacked(data, self._source)
+            if frames is None:
+                continue
+            if len(frames) != len(table):
+                text = f"the user data corrects {len(frames)} frames, but there are {len(table)}; the file may be cut"
+                self._tell("warning", "corrections", text)
+            for k, frame in enumerate(frames[: len(table)]):
+                for place, amount in frame.items():
+                    value = int(table[k, place]) + amount if place < ROW else _INT32
+                    if not -_INT32 <= value < _INT32 or not sent[k, place]:
+                        raise FapStreamError(f"{self._source}: the user data corrects what frame {k + 1} does not hold")
+                    table[k, place] = value
+        return table
 
     def _plane_follows(self) -> bool:
         """Pass stuffing and a plane start code, if any; False at the end."""
@@ -214,7 +234,7 @@ class Decoder:
         run.finish()
 
     def _row(self, segment: Segment) -> tuple[np.ndarray, np.ndarray]:
-        row = np.zeros(_ROW, dtype=np.int32)
+        row = np.zeros(ROW, dtype=np.int32)
         mask = np.zeros(FAP_COUNT, dtype=np.bool_)
         for fap_id in segment.mask:
             mask[fap_id - 1] = True
@@ -223,7 +243,7 @@ class Decoder:
         for fap_id, fields in segment.runs():
             if fap_id:
                 values = [self._held[key] for key in fields] + list(self._flags[fap_id])
-                row[_PLACES[fap_id] : _PLACES[fap_id] + len(values)] = values
+                row[COLUMNS[fap_id] : COLUMNS[fap_id] + len(values)] = values
         return row, mask
 
     def _tell(self, severity: Severity, code: str, message: str) -> None:

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.errors import FapStreamError, UnsupportedFeatureError
-from fba.faps import LOW_LEVEL_FAPS, fap
-from fba.findings import Finding
+from fba.errors import FapStreamError
+from fba.faps import LOW_LEVEL_FAPS
 from fba.stream import FapStream
 from formats.fba_bitstream.arithmetic import RunEncoder
 from formats.fba_bitstream.bits import BitWriter
+from formats.fba_bitstream.rates import coded_rate
 from formats.fba_bitstream.syntax import (
     ALL,
     FACE,
@@ -30,6 +30,7 @@ from formats.fba_bitstream.syntax import (
     FieldKey,
     Ranges,
     Segment,
+    column,
     range_fields,
     rounded,
 )
@@ -40,10 +41,11 @@ LARGEST_GAP = 100_000
 
 @dataclass
 class _Levels:
-    """One plane: is it intra, and the level of every field."""
+    """One plane: is it intra, the level of every field, and what the decoder then lacks of its value."""
 
     intra: bool
     levels: dict[FieldKey, int]
+    missing: dict[FieldKey, int]
 
 
 @dataclass
@@ -75,6 +77,12 @@ class Encoder:
         """The decoder gets every value as it is."""
         return not (self.clipped or self.rounded)
 
+    def corrections(self) -> Iterator[dict[int, int]]:
+        """For each frame: column of a value -> what the decoder lacks of it."""
+        for part in self._parts:
+            for plane in part.planes:
+                yield {column(*key): amount for key, amount in plane.missing.items()}
+
     def _split(self) -> Iterator[_Part]:
         """Levels of all planes: intra where the mask changes, and where a change is too large but the value is not."""
         part: _Part | None = None
@@ -88,7 +96,9 @@ class Encoder:
                     yield part
                 part = _Part(mask, [])
                 last = dict.fromkeys(wanted, 0)
-            part.planes.append(_Levels(intra, self._quantize(mask, wanted, last, intra)))
+            levels = self._quantize(mask, wanted, last, intra)
+            missing = {key: value - last[key] for key, value in wanted.items() if value != last[key]}
+            part.planes.append(_Levels(intra, levels, missing | self._flags_beyond_a_bit(frame, mask)))
         if part is not None:
             yield part
 
@@ -101,6 +111,18 @@ class Encoder:
             else:
                 wanted[fap_id, 0] = int(self._stream.values[frame, fap_id - 1])
         return wanted
+
+    def _flags_beyond_a_bit(self, frame: int, mask: tuple[int, ...]) -> dict[FieldKey, int]:
+        """What is lost of flags that are neither 0 nor 1."""
+        fields = {1: self._stream.visemes[frame], 2: self._stream.expressions[frame]}
+        lost: dict[FieldKey, int] = {}
+        for fap_id in fields.keys() & set(mask):
+            for number in range(len(HIGH_LEVEL[fap_id]), len(fields[fap_id])):
+                flag = int(fields[fap_id][number])
+                if flag not in (0, 1):
+                    lost[fap_id, number] = flag - (flag & 1)
+                    self.clipped[fap_id] = max(self.clipped.get(fap_id, 0), abs(lost[fap_id, number]))
+        return lost
 
     def _widest(self, mask: tuple[int, ...]) -> Segment:
         widest = dict.fromkeys(LOW_LEVEL_FAPS, LARGEST_RANGE)
@@ -231,49 +253,3 @@ def _ranges(part: _Part, quantizer: int) -> tuple[Ranges, Ranges]:
             )
         )
     return made[0], made[1]
-
-
-def coded_rate(rate: float) -> tuple[int, bool]:
-    """The frame rate that can be written nearest to this one: sixteenths, and whether they are times 1000/1001.
-
-    Raises
-    ------
-    UnsupportedFeatureError
-        Beyond 1/16 to 255.9 frames a second.
-    """
-    choices = [(round(rate * (1.001 if ntsc else 1.0) * 16), ntsc) for ntsc in (False, True)]
-    best = min(choices, key=lambda c: abs(rate_of(*c) - rate))
-    if not 1 <= best[0] < 16 * 256:
-        raise UnsupportedFeatureError(f"an FBA bitstream has 1/16 to 255.9 frames a second, not {rate:g}")
-    return best
-
-
-def rate_of(sixteenths: int, ntsc: bool) -> float:
-    """Frames a second."""
-    return sixteenths / 16 * (1000 / 1001 if ntsc else 1.0)
-
-
-def fap_list(amounts: dict[int, int]) -> str:
-    """``head_pitch (84), ...``: the largest amounts first, the rest as a number."""
-    order = sorted(amounts, key=lambda k: (-amounts[k], k))
-    text = ", ".join(f"{fap(k).name} ({amounts[k]})" for k in order[:4])
-    return text + (f" and {len(order) - 4} more" if len(order) > 4 else "")
-
-
-def findings(encoder: Encoder, stream: FapStream, quantizer: int) -> list[Finding]:
-    """What the bitstream does not carry as it is."""
-    found = []
-    if encoder.rounded:
-        text = f"values are rounded to steps of the scale {quantizer}, off by up to: {fap_list(encoder.rounded)}"
-        found.append(Finding("warning", "fap-rounded", text))
-    if encoder.clipped:
-        text = f"values beyond what can be coded are cut, off by up to: {fap_list(encoder.clipped)}"
-        found.append(Finding("warning", "fap-clipped", text))
-    written = rate_of(*coded_rate(stream.frame_rate))
-    if abs(written - stream.frame_rate) > 1e-4 * stream.frame_rate:
-        text = f"{stream.frame_rate:g} frames a second become {written:g}, the nearest that can be coded"
-        found.append(Finding("warning", "frame-rate", text))
-    if int(stream.frame_numbers[0]) < 0:
-        text = f"frames are counted from 0 instead of {int(stream.frame_numbers[0])}"
-        found.append(Finding("info", "frame-numbers", text))
-    return found

@@ -9,6 +9,7 @@ from functools import cache
 from fba.errors import FapStreamError
 from fba.faps import FAP_COUNT, LOW_LEVEL_FAPS, faps
 from fba.high_level import BLEND_MAX, EXPRESSIONS, VISEMES
+from fba.stream import EXPRESSION_FIELDS, VISEME_FIELDS
 from formats.fba_bitstream.arithmetic import AdaptiveModel, Model, UniformModel
 
 OBJECT_START, PLANE_START, SEQUENCE_END = 0x1BA, 0x1BB, 0x1B1
@@ -45,6 +46,15 @@ _ROLL_RANGES = (1080, 420)
 
 FieldKey = tuple[int, int]
 """A FAP and the number of its field (0 for low-level FAPs)."""
+
+COLUMNS = {1: FAP_COUNT, 2: FAP_COUNT + len(VISEME_FIELDS)}
+"""Where the fields of FAP 1 and 2 begin in a frame's row of values, behind one column for each FAP."""
+ROW = FAP_COUNT + len(VISEME_FIELDS) + len(EXPRESSION_FIELDS)
+
+
+def column(fap_id: int, number: int) -> int:
+    """Where a field stands in a frame's row of values."""
+    return COLUMNS[fap_id] + number if fap_id in COLUMNS else fap_id - 1
 
 
 @cache

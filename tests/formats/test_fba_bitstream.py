@@ -15,6 +15,8 @@ from formats.fap import read_fap
 from formats.fba_bitstream import decode_fba, decoder, encode_fba, read_fba, write_fba
 from formats.fba_bitstream.arithmetic import FULL, AdaptiveModel, RunDecoder, RunEncoder, UniformModel
 from formats.fba_bitstream.bits import BitReader, BitWriter
+from formats.fba_bitstream.corrections import MAGIC, put_number
+from formats.fba_bitstream.sequence import wrapped
 from formats.fba_bitstream.syntax import HIGH_LEVEL, OBJECT_START, SEQUENCE_END, Ranges, Segment
 from samples import sample
 
@@ -82,19 +84,25 @@ def test_public_streams(shared: Path, name: str, tmp_path: Path) -> None:
     stream = read_fap(shared / "fap_samples" / name)[0]
     said = write_fba(stream, tmp_path / "s.fba")
     again = read_fba(tmp_path / "s.fba")[0]
-    if name == "vreng_jag.fap":
-        # Its head turns further than values without quantization can be coded.
-        assert "fap-rounded" in codes(said)
-        assert not np.any(again.values % STEPS)
-        assert np.all(2 * np.abs(again.values - stream.values) <= STEPS)
-    else:
-        assert codes(said) == {"experimental"}
-        assert np.array_equal(again.values, stream.values)
-    assert np.array_equal(again.mask, stream.mask)
-    assert np.array_equal(again.frame_numbers, stream.frame_numbers)
-    assert again.frame_rate == stream.frame_rate
+    assert same(again, stream)
+    # The head of this one turns further in a frame than values without quantization can be coded.
+    leaps = name == "vreng_jag.fap"
+    assert codes(said) == {"experimental", "fap-corrections"} if leaps else {"experimental"}
     write_fba(again, tmp_path / "again.fba")
     assert (tmp_path / "again.fba").read_bytes() == (tmp_path / "s.fba").read_bytes()
+
+
+def test_decoders_without_corrections_see_values_rounded_to_the_first_scale(shared: Path) -> None:
+    stream = read_fap(shared / "fap_samples" / "vreng_jag.fap")[0]
+    data, said = encode_fba(stream)
+    told = next(f.message for f in said if f.code == "fap-corrections")
+    assert "head_yaw" in told
+    assert "1860" in told
+    inside = data[data.index(OBJECT_START.to_bytes(4, "big")) :]
+    assert inside == encode_fba(stream, 1)[0]
+    values = decode_fba(inside)[0].values
+    assert not np.any(values % STEPS)
+    assert np.all(2 * np.abs(values - stream.values) <= STEPS)
 
 
 def test_visemes_expressions_and_flags_of_the_shipped_stream() -> None:
@@ -124,10 +132,13 @@ def test_values_are_the_nearest_multiples_of_the_step(scale: int) -> None:
 
 def test_values_beyond_the_range_are_cut_and_told() -> None:
     stream = FapStream.build(25, 3, {48: [400_000, 400_000, 0], 3: [5, 6, 7]})
-    data, said = encode_fba(stream)
+    data, said = encode_fba(stream, 1)
     assert decode_fba(data)[0].values[:, 47].tolist() == [1860 * 170, 400_010, 0]
     assert {"fap-clipped", "fap-rounded"} <= codes(said)
     assert "head_pitch (83800)" in next(f.message for f in said if f.code == "fap-clipped")
+    data, said = encode_fba(stream)
+    assert same(decode_fba(data)[0], stream)
+    assert "head_pitch (398140)" in next(f.message for f in said if f.code == "fap-corrections")
 
 
 def test_a_leap_that_no_difference_can_tell_begins_anew() -> None:
@@ -277,6 +288,62 @@ def test_start_codes_of_old_drafts_and_before_every_plane() -> None:
             assert len(decode_fba(stream_of(head + tail))[0]) == 2
 
 
+EVERYTHING = FapStream.build(
+    25,
+    3,
+    {3: [5, 2**31 - 1, -(2**31)], 19: [0, 1024, 0]},
+    visemes=[[1, 2, 63, 1], [99, -5, 70, 2], [0, 0, 0, -3]],
+    expressions=[[1, 60, 2, 0, 1, 0], [7, 2**31 - 1, 0, 0, 9, 1], [-1, 0, 0, 0, 0, -(2**31)]],
+)
+"""Values that no bitstream of this syntax holds."""
+
+
+def test_corrections_make_any_stream_exact() -> None:
+    data, said = encode_fba(EVERYTHING)
+    assert "fap-corrections" in codes(said)
+    assert same(decode_fba(data)[0], EVERYTHING)
+
+
+def test_a_sequence_around_the_face_is_passed_over() -> None:
+    stream = small()
+    data = encode_fba(stream, 0)[0]
+    for head in (b"", b"\0\0\1\xb0\x61", b"\0\0\1\xb0\x61\0\0\1\xb2of another program"):
+        for identified in (b"\x23", b"\x91\x47"):
+            assert same(decode_fba(head + b"\0\0\1\xb5" + identified + data)[0], stream)
+    with pytest.raises(UnsupportedFeatureError, match=r"byte 5: .* of type 1"):
+        decode_fba(b"\0\0\1\xb0\x61\0\0\1\xb5\x09" + data)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ([1, 3], "corrections in the user data are damaged"),
+        ([1, 3, 2, 0, 0], "corrects what frame 1 does not hold"),
+        ([1, 200, 2, 0, 0], "corrects what frame 1 does not hold"),
+        ([1, 2, 2**32, 0, 0], "corrects what frame 1 does not hold"),
+        ([1, 2, 2**37, 0, 0], "corrections in the user data are damaged"),
+    ],
+)
+def test_corrections_that_do_not_fit_are_told(numbers: list[int], message: str) -> None:
+    written = bytearray(MAGIC)
+    for number in numbers:
+        put_number(written, number)
+    plain = encode_fba(FapStream.build(25, 3, {3: [0, 1, 2]}), 0)[0]
+    with pytest.raises(FapStreamError, match=message):
+        decode_fba(wrapped(plain, bytes(written)))
+    with pytest.raises(FapStreamError, match="damaged"):
+        decode_fba(wrapped(plain, MAGIC + b"\x80\x80a"))
+
+
+def test_corrections_of_other_frames_are_told() -> None:
+    stream = FapStream.build(25, 3, {3: [0, 1, 2]})
+    plain = encode_fba(stream, 0)[0]
+    for count in (0, 2, 4):
+        again, said = decode_fba(wrapped(plain, MAGIC + count * b"\x81\x82\x84"))
+        assert "corrections" in codes(said)
+        assert (again.values - stream.values)[:, 2].tolist() == [2 * (k < count) for k in range(3)]
+
+
 def test_a_missing_end_code_is_told() -> None:
     plane = "".join(EMPTY_PLANE.split())
     whole = OBJECT_START.to_bytes(4, "big") + bits_of(plane + "0" * (-len(plane) % 8))
@@ -290,7 +357,7 @@ def test_every_cut_is_told() -> None:
     for end in range(0, len(data) - 3, 41):
         found, said = outcome(data[:end])
         assert found is None or len(found) < whole
-        assert ("byte" if found is None else "no-end-code") in said
+        assert ("byte" if found is None else "no-end-code") in said or ("corrections" in said and "damaged" in said)
 
 
 @pytest.mark.parametrize(
@@ -316,7 +383,7 @@ def test_what_cannot_be_read_is_told(bits: str, error: type[FbaError], message: 
 def test_other_files_are_refused(tmp_path: Path) -> None:
     for data in (b"x", b"\0\0\1\xb0abc", b"2.1 demo 25 1\n"):
         (tmp_path / "x.fba").write_bytes(data)
-        with pytest.raises(FapStreamError, match=r"x\.fba, byte 0, bit 0: there is no FBA object start code"):
+        with pytest.raises(FapStreamError, match=r"x\.fba, byte \d, bit 0: there is no FBA object start code"):
             read_fba(tmp_path / "x.fba")
     with pytest.raises(FapStreamError, match="holds no frames"):
         decode_fba(b"\0\0\1\xba\x7f\0\0\1\xb1")
