@@ -21,10 +21,26 @@ register(Format("OFF", (".off",), "formats.off"))
 register(Format("Candide-3", (".wfm",), "formats.wfm", writes=False))
 register(Format("glTF 2.0", (".gltf", ".glb"), "formats.gltf", carries_tables=True, carries_streams=True))
 register(
-    Format("VRML97", (".wrl", ".wrz", ".wrl.gz", ".vrml"), "formats.vrml97", carries_tables=True, names_images=True)
+    Format(
+        "VRML97",
+        (".wrl", ".wrz", ".wrl.gz", ".vrml"),
+        "formats.vrml97",
+        carries_tables=True,
+        names_images=True,
+        portable=True,
+    )
 )
 register(Format("MPEG-4 BT", (".bt", ".bt.gz"), "formats.bt", carries_tables=True, names_images=True))
-register(Format("USD", (".usda", ".usdc", ".usd"), "formats.usd", carries_tables=True, names_images=True))
+register(
+    Format(
+        "USD",
+        (".usda", ".usdc", ".usd"),
+        "formats.usd",
+        carries_tables=True,
+        names_images=True,
+        carries_streams=True,
+    )
+)
 
 __all__ = [
     "Format",

@@ -10,6 +10,7 @@ from pathlib import Path
 from fat.face import AnimatableFace
 from fba.scene import FaceScene
 from fba.shapes import ShapeSet
+from fba.stream import FapStream
 
 
 def read(path: Path) -> FaceScene | AnimatableFace:
@@ -32,8 +33,10 @@ def read(path: Path) -> FaceScene | AnimatableFace:
     return read_usd(path)
 
 
-def write(face: FaceScene | AnimatableFace, path: Path) -> None:
+def write(face: FaceScene | AnimatableFace, path: Path, stream: FapStream | None = None) -> None:
     """Write a scene, or a face with its tables as blend shapes; .usd holds the binary form.
+
+    stream : played on the face; becomes the animation of the stage.
 
     Raises
     ------
@@ -44,7 +47,7 @@ def write(face: FaceScene | AnimatableFace, path: Path) -> None:
     """
     from formats.usd.writer import write_usd
 
-    write_usd(face, path)
+    write_usd(face, path, stream)
 
 
 def read_shape_set(path: Path) -> ShapeSet | None:

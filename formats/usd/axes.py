@@ -54,6 +54,11 @@ class StageAxes:
         """Scale factors along the inside axes, as factors along the stage's; exact."""
         return _triple(np.abs(self.frame.axes.T) @ np.asarray(value, dtype=np.float64))
 
+    def scales(self, values: Floats) -> Floats:
+        """(..., 3) scale factors along the inside axes, as factors along the stage's; exact."""
+        factors: Floats = values @ np.abs(self.frame.axes)
+        return factors
+
     def scale_back(self, value: Vector) -> Vector:
         """Scale factors along the stage's axes, as factors along the inside ones; exact."""
         return _triple(np.abs(self.frame.axes) @ np.asarray(value, dtype=np.float64))

@@ -1,6 +1,6 @@
 """FaceDefMesh as UsdSkel blend shapes with inbetweens, and back; plain targets as well.
 
-Weight 1 is the last positive border of the intervals; every other border is an inbetween at ``border / last``,
+Weight 1 is the last positive border of a table; every other border is an inbetween at ``border / last``,
 negative ones too, with the displacement accumulated there. UsdSkel goes linearly from one to the next, and on
 beyond the last, which is what the standard says of a FaceDefMesh.
 """
@@ -8,6 +8,7 @@ beyond the last, which is what the standard says of a FaceDefMesh.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from fba.errors import FaceDefTablesError, InputFileError
 from fba.faps import fap
 from fba.fapu import Fapu
 from formats.normals import SmoothNormals
+from formats.targets import table_borders
 from formats.usd.axes import StageAxes
 from formats.usd.names import Namer
 from formats.usd.properties import ints, need, put, put_array, rows, to_single, vt
@@ -35,8 +37,17 @@ NORMAL_PLACES = 4
 """Decimal places of what rounded tables do to normals: a hundredth of a degree."""
 
 
+@dataclass(frozen=True, eq=False)
+class Between:
+    """An inbetween: at which weight the offsets (k, 3) hold, and those of the normals."""
+
+    weight: float
+    offsets: Floats
+    normals: Floats | None
+
+
 class MeshTargets:
-    """Collects the blend shapes of one mesh and binds them to it."""
+    """Collects the blend shapes of one mesh and tells it of them."""
 
     def __init__(self, mesh: Usd.Prim, namer: Namer, axes: StageAxes, normals: SmoothNormals | None) -> None:
         self.mesh = mesh
@@ -52,13 +63,20 @@ class MeshTargets:
         """Names of the blend shapes so far, as a SkelAnimation has to list them."""
         return tuple(self._tokens)
 
+    def turned(self, index: Ints, offsets: Floats, places: int | None = None) -> Floats | None:
+        """What offsets do to the normals of these vertices (k, 3); None where the mesh has normals of its own.
+
+        places : round to so many decimal places; None keeps all digits.
+        """
+        return None if self._normals is None else rounded(self._normals.offsets(index, offsets), places)
+
     def add(
         self,
         name: str,
         index: Ints,
-        full: Floats,
-        between: Mapping[str, tuple[float, Floats]] | None = None,
-        normal_places: int | None = None,
+        offsets: Floats,
+        normals: Floats | None,
+        between: Mapping[str, Between] | None = None,
     ) -> UsdSkel.BlendShape:
         """Author a blend shape.
 
@@ -66,23 +84,21 @@ class MeshTargets:
         ----------
         name : what animations know it by; the prim gets another one where that is taken by a subset.
         index : (k,) vertices that move.
-        full : (k, 3) offsets at weight 1; inside axes, local coordinates of the mesh.
-        between : name of an inbetween -> its weight and its offsets.
-        normal_places : round what happens to normals to so many decimal places; None keeps all digits.
+        offsets, normals : (k, 3) at weight 1; inside axes, local coordinates of the mesh.
+        between : the inbetweens by their names.
         """
         path = self.mesh.GetPath().AppendChild(self._namer.name(name))
         shape = UsdSkel.BlendShape.Define(self.mesh.GetStage(), path)
-        shape.CreateOffsetsAttr(self._stage_vectors(full))
+        shape.CreateOffsetsAttr(self._stage_vectors(offsets))
         shape.CreatePointIndicesAttr(vt(index))
-        if self._normals is not None:
-            shape.CreateNormalOffsetsAttr(self._stage_vectors(_cut(self._normals.offsets(index, full), normal_places)))
-        for label, (weight, offsets) in (between or {}).items():
+        if normals is not None:
+            shape.CreateNormalOffsetsAttr(self._stage_vectors(normals))
+        for label, values in (between or {}).items():
             inbetween = shape.CreateInbetween(label)
-            inbetween.SetWeight(weight)
-            inbetween.SetOffsets(self._stage_vectors(offsets))
-            if self._normals is not None:
-                turned = _cut(self._normals.offsets(index, offsets), normal_places)
-                inbetween.SetNormalOffsets(self._stage_vectors(turned))
+            inbetween.SetWeight(values.weight)
+            inbetween.SetOffsets(self._stage_vectors(values.offsets))
+            if values.normals is not None:
+                inbetween.SetNormalOffsets(self._stage_vectors(values.normals))
         self._tokens.append(self._token_namer.name(name))
         self._paths.append(path)
         return shape
@@ -90,24 +106,26 @@ class MeshTargets:
     def _stage_vectors(self, values: Floats) -> Any:
         return vt(to_single(self._axes.vectors(values)))
 
-    def bind(self, skeleton: Sdf.Path) -> None:
-        """Tell the mesh its blend shapes and the skeleton whose animation drives them."""
+    def bind(self) -> None:
+        """Tell the mesh its blend shapes."""
         binding = UsdSkel.BindingAPI.Apply(self.mesh)
-        binding.CreateSkeletonRel().SetTargets([skeleton])
         binding.CreateBlendShapesAttr(self._tokens)
         binding.CreateBlendShapeTargetsRel().SetTargets(self._paths)
 
 
-def _cut(values: Floats, places: int | None) -> Floats:
+def rounded(values: Floats, places: int | None) -> Floats:
     """Numbers of so many decimal places (None: as they are), without negative zeros."""
     if places is None:
         return values
-    rounded: Floats = np.round(values, places) + 0.0
-    return rounded
+    short: Floats = np.round(values, places) + 0.0
+    return short
 
 
 def full_value(borders: Ints) -> int:
-    """The FAP value at weight 1: the last positive border, or the size of the first where none is positive."""
+    """The value of a table at weight 1: its last positive border, or the size of the first where none is positive.
+
+    borders : increasing, those of all meshes of the table (`formats.targets.table_borders`).
+    """
     last = int(borders[-1])
     return last if last > 0 else -int(borders[0])
 
@@ -119,19 +137,23 @@ def write_face_def_mesh(
 
     Where the slopes were rounded, the offsets are too: their text would be twice as long and say nothing more.
     """
-    full = full_value(mesh.interval_borders)
+    full = full_value(table_borders(table))
     places = _inbetween_borders(mesh.interval_borders, full)
-    offsets = _accumulated(mesh, [full, *places], fapu.unit(fap(table.fap_id).unit))
+    unit = fapu.unit(fap(table.fap_id).unit)
+    offsets = _accumulated(mesh, [full, *places], unit)
     if not np.all(np.isfinite(to_single(offsets))):
         raise FaceDefTablesError(f"{table.name} moves '{mesh.shape}' further than 32-bit numbers can say")
-    digits = _places(mesh, float(np.abs(offsets).max(initial=0.0)), full, fapu.unit(fap(table.fap_id).unit))
-    offsets = _cut(offsets, digits)
+    digits = _places(mesh, float(np.abs(offsets).max(initial=0.0)), full, unit)
+    offsets = rounded(offsets, digits)
+    normal_places = None if digits is None else NORMAL_PLACES
+    index = mesh.coord_index
     between = {
-        f"at_{border}".replace("-", "minus_"): (border / full, values)
+        f"at_{border}".replace("-", "minus_"): Between(
+            border / full, values, targets.turned(index, values, normal_places)
+        )
         for border, values in zip(places, offsets[1:], strict=True)
     }
-    normal_places = None if digits is None else NORMAL_PLACES
-    shape = targets.add(table.name, mesh.coord_index, offsets[0], between, normal_places)
+    shape = targets.add(table.name, index, offsets[0], targets.turned(index, offsets[0], normal_places), between)
     prim = shape.GetPrim()
     put(prim, "fapID", Sdf.ValueTypeNames.Int, table.fap_id)
     put(prim, "highLevelSelect", Sdf.ValueTypeNames.Int, table.high_level_select)
@@ -152,6 +174,7 @@ def _places(mesh: FaceDefMesh, largest: float, full: int, unit: float) -> int | 
 
 
 def _inbetween_borders(borders: Ints, full: int) -> list[int]:
+    """The borders of a mesh that are not weight 0 or 1."""
     return [int(b) for b in borders if b not in (0, full)]
 
 
@@ -178,7 +201,9 @@ def read_face_def_mesh(prim: Usd.Prim, shape: str, fap_id: int, fapu: Fapu, axes
     index = ints(blend.GetPointIndicesAttr().Get() or [])
     slopes = rows(need(prim, "slopes"), 3)
     unit = fapu.unit(fap(fap_id).unit)
-    full = full_value(borders)
+    full = int(need(prim, "valueAtWeightOne"))
+    if full == 0:
+        raise InputFileError(f"{prim.GetPath()} is damaged: its fba:valueAtWeightOne is 0")
     values = [full, *_inbetween_borders(borders, full)]
     stored = _stored_offsets(blend, values, index.size)
     try:
@@ -212,7 +237,10 @@ def _stored_offsets(blend: UsdSkel.BlendShape, values: list[int], count: int) ->
 
 
 def _slopes(borders: Ints, values: list[int], offsets: NDArray[np.float32], unit: float) -> Floats:
-    """Slopes (k, b-1, 3) whose accumulated displacements at these values are the offsets (v, k, 3)."""
+    """Slopes (k, b-1, 3) whose accumulated displacements at these values are the offsets (v, k, 3), as near as can be.
+
+    Where weight 1 lies beyond a mesh's own borders there is one offset more than there are slopes.
+    """
     weights = interval_weights(borders, values) * unit
-    slopes: Floats = np.einsum("jv,vkc->kjc", np.linalg.inv(weights), offsets.astype(np.float64))
+    slopes: Floats = np.einsum("jv,vkc->kjc", np.linalg.pinv(weights), offsets.astype(np.float64))
     return slopes

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pxr import Sdf, Tf, Usd
 
-from fba.scene import FaceScene
+from fba.scene import FaceScene, Transform
 from formats.usd.properties import get, put_string
 
 RESERVED = ("Animation", "FeaturePoints", "Materials", "Skeleton", "Tables")
 """Prims of the writer itself; a node of that name gets a number behind."""
+
+CHILDREN = "children"
+"""Own relationship of the root and of transforms: the prims of their child nodes, in order."""
 
 
 class Namer:
@@ -29,11 +32,11 @@ class Namer:
 
 
 def node_paths(scene: FaceScene, root: Sdf.Path) -> dict[str, Sdf.Path]:
-    """Path of the prim of every node of a scene, parents first."""
+    """Path of the prim of every node of a scene, parents first; shapes stand directly below the root."""
     namers: dict[Sdf.Path, Namer] = {}
     paths: dict[str, Sdf.Path] = {}
     for node, parents in scene.walk():
-        parent = paths[parents[-1].name] if parents else root
+        parent = paths[parents[-1].name] if parents and isinstance(node, Transform) else root
         namer = namers.setdefault(parent, Namer(RESERVED))
         paths[node.name] = parent.AppendChild(namer.name(node.name))
     return paths

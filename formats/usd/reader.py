@@ -17,8 +17,8 @@ from formats.usd.axes import StageAxes, UsdDocument, read_axes
 from formats.usd.blend_shapes import read_face_def_mesh
 from formats.usd.facts import read_fapu, read_feature_points, read_notes
 from formats.usd.meshes import read_mesh
-from formats.usd.names import name_of
-from formats.usd.properties import get, need, target, targets
+from formats.usd.names import CHILDREN, name_of
+from formats.usd.properties import PREFIX, get, need, target, targets
 from formats.usd.stages import open_stage, reading
 from formats.usd.writer import FORMAT
 from formats.usd.xforms import read_placement
@@ -77,7 +77,7 @@ def read_stage(stage: Usd.Stage, path: Path) -> tuple[FaceScene, StageAxes, dict
     walk = _Walk(axes, own=root is not None)
     default = stage.GetDefaultPrim()
     tops = [root or default] if root or default else list(stage.GetPseudoRoot().GetFilteredChildren(_PREDICATE))
-    nodes = walk.nodes(tops)
+    nodes = walk.kept(root) if root and root.HasRelationship(PREFIX + CHILDREN) else walk.nodes(tops)
     if not walk.meshes and root is None and default:
         # The default prim is not where the geometry is.
         nodes = walk.nodes(list(stage.GetPseudoRoot().GetFilteredChildren(_PREDICATE)))
@@ -97,6 +97,18 @@ class _Walk:
         self._axes = axes
         self._own = own
         self.meshes: list[Usd.Prim] = []
+
+    def kept(self, parent: Usd.Prim) -> list[Node]:
+        """The nodes that this toolkit's writer put below a prim, whose meshes stand elsewhere in the stage."""
+        nodes: list[Node] = []
+        for prim in targets(parent, CHILDREN):
+            name = name_of(prim)
+            if prim.IsA(UsdGeom.Mesh):
+                self.meshes.append(prim)
+                nodes.append(read_mesh(prim, self._axes, name))
+            else:
+                nodes.append(read_placement(prim, self._axes).node(name, tuple(self.kept(prim))))
+        return nodes
 
     def nodes(self, prims: list[Usd.Prim]) -> list[Node]:
         return [node for prim in prims for node in self._visit(prim)]

@@ -16,7 +16,7 @@ from formats.usd.names import Namer, name_of
 from formats.usd.properties import get, ints, put, put_string, rows, to_single
 from formats.usd.reader import own_root, read_stage
 from formats.usd.stages import open_stage, quiet, reading, save_layer
-from formats.usd.writer import bind_targets, start
+from formats.usd.writer import finish, start
 
 
 def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
@@ -38,9 +38,10 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
                 inside: Floats = scene.frame.from_file(deltas[places[shape.name]]) @ turn
                 index = np.flatnonzero(np.any(to_single(inside) != 0.0, axis=1)).astype(np.int32)
                 if index.size:
-                    put_string(own.add(token, index, inside[index]).GetPrim(), "name", name)
+                    offsets = inside[index]
+                    put_string(own.add(token, index, offsets, own.turned(index, offsets)).GetPrim(), "name", name)
             targets.append(own)
-        bind_targets(draft, targets)
+        finish(draft, targets)
     save_layer(draft.layer, path)
 
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdSkel, UsdValidation
 
 from fba.findings import Finding
-from formats.usd.blend_shapes import full_value
 from formats.usd.properties import get, ints, rows
 from formats.usd.stages import open_stage, reading
 
@@ -168,10 +167,13 @@ def _table(prim: Usd.Prim, count: int, weights: list[float]) -> Iterator[Finding
         text = "fba:intervalBorders must be at least two increasing integers with 0 among them"
         yield Finding("error", "usd-interval-borders", text, where)
         return
-    full = full_value(borders)
+    full = get(prim, "valueAtWeightOne")
+    if not full:
+        yield Finding("error", "usd-weight-one", "fba:valueAtWeightOne must be a FAP value other than 0", where)
+        return
     wanted = sorted(np.float32(b / full) for b in borders.tolist() if b not in (0, full))
     if wanted != sorted(np.float32(w) for w in weights if w is not None):
-        text = "the inbetweens are not at fba:intervalBorders divided by the last positive border"
+        text = "the inbetweens are not at fba:intervalBorders divided by fba:valueAtWeightOne"
         yield Finding("error", "usd-interval-borders", text, where)
     slopes = len(get(prim, "slopes") or ())
     needed = count * (borders.size - 1)

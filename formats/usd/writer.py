@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from pxr import Gf, Kind, Sdf, Tf, Usd, UsdSkel, Vt
+from pxr import Gf, Kind, Sdf, Tf, Usd
 
 from fat.build import check_indices
 from fat.face import AnimatableFace
-from fat.tables import FaceDefTransform
-from fba.errors import FaceDefTablesError
+from fat.tables import FaceDefTables, FaceDefTransform
+from fba.arrays import Floats
 from fba.scene import FaceScene, Shape
+from fba.stream import FapStream
 from formats.normals import SmoothNormals
+from formats.targets import table_borders
+from formats.usd.animation import Motion, motion_of, write_animation
 from formats.usd.axes import StageAxes, axes_for, write_axes
-from formats.usd.blend_shapes import MeshTargets, write_face_def_mesh
+from formats.usd.blend_shapes import MeshTargets, full_value, write_face_def_mesh
 from formats.usd.facts import write_facts
+from formats.usd.joints import Rig, gf_matrix
 from formats.usd.materials import MaterialLibrary
 from formats.usd.meshes import write_mesh
-from formats.usd.names import Namer, node_paths, put_name
+from formats.usd.names import CHILDREN, Namer, node_paths, put_name
 from formats.usd.properties import put, put_string, put_targets
 from formats.usd.stages import quiet, save_layer
-from formats.usd.xforms import write_transform
+from formats.usd.xforms import write_matrix, write_transform
 
 FORMAT = "fba-usd/1"
-JOINT = "root"
+ANIMATION = "Animation"
+SKELETON = "Skeleton"
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +39,15 @@ class Draft:
 
     Attributes
     ----------
+    scene : what is being written.
+    rig : the joints that its meshes hang on.
     paths : name of a scene node -> its prim.
     namers : name of a shape -> what hands out the names of prims below it.
     normals : name of a shape -> the normals that it was given; None where it has its own.
     """
 
+    scene: FaceScene
+    rig: Rig
     layer: Sdf.Layer
     stage: Usd.Stage
     root: Usd.Prim
@@ -53,20 +62,26 @@ class Draft:
         return MeshTargets(prim, self.namers[shape], self.axes, self.normals[shape])
 
 
-def write_usd(face: FaceScene | AnimatableFace, path: Path) -> None:
+def write_usd(face: FaceScene | AnimatableFace, path: Path, stream: FapStream | None) -> None:
     """Write a scene, or a face with its tables as blend shapes; see `formats.usd.write`."""
     with quiet():
         if isinstance(face, AnimatableFace):
-            draft = start(face.scene, "SkelRoot")
+            draft = start(face.scene, "SkelRoot", Rig(face.scene, face.tables))
             write_facts(draft.root, face, draft.paths, draft.axes)
-            _write_tables(draft, face)
+            _write_tables(draft, face, None if stream is None else motion_of(face, stream))
         else:
             draft = start(face, "Xform")
     save_layer(draft.layer, path)
 
 
-def start(scene: FaceScene, root_type: str) -> Draft:
-    """Build the stage of a scene: transforms, meshes, materials, axes and units."""
+def start(scene: FaceScene, root_type: str, rig: Rig | None = None) -> Draft:
+    """Build the stage of a scene: transforms, meshes, materials, axes and units.
+
+    The meshes stand directly below the root, each with its own matrix: readers differ in whether a mesh with joints
+    follows the transforms above it too. Which mesh belongs to which transform is kept beside.
+
+    rig : made of the same shapes; None for one without joints.
+    """
     layer = Sdf.Layer.CreateAnonymous(".usda")
     stage = Usd.Stage.Open(layer)
     root = stage.DefinePrim(Sdf.Path.absoluteRootPath.AppendChild(Tf.MakeValidIdentifier(scene.name)), root_type)
@@ -77,71 +92,70 @@ def start(scene: FaceScene, root_type: str) -> Draft:
     write_axes(stage, root, scene, axes)
     paths = node_paths(scene, root.GetPath())
     library = MaterialLibrary(stage, root.GetPath().AppendChild("Materials"))
-    namers: dict[str, Namer] = {}
-    normals: dict[str, SmoothNormals | None] = {}
+    draft = Draft(scene, rig or Rig(scene, FaceDefTables()), layer, stage, root, axes, paths, {}, {})
     for node, _ in scene.walk():
         if isinstance(node, Shape):
             smooth = SmoothNormals(node.mesh) if node.mesh.normal_indices is None else None
-            namers[node.name] = write_mesh(stage, paths[node.name], node, axes, library, smooth)
-            normals[node.name] = smooth
+            draft.namers[node.name] = write_mesh(stage, paths[node.name], node, axes, library, smooth)
+            draft.normals[node.name] = smooth
+            write_matrix(stage.GetPrimAtPath(paths[node.name]), gf_matrix(scene.world_matrix(node.name), axes))
         else:
-            write_transform(stage.DefinePrim(paths[node.name], "Xform"), node, axes)
+            prim = stage.DefinePrim(paths[node.name], "Xform")
+            write_transform(prim, node, axes)
+            put_targets(prim, CHILDREN, [paths[child.name] for child in node.children])
         put_name(stage.GetPrimAtPath(paths[node.name]), node.name)
-    return Draft(layer, stage, root, axes, paths, namers, normals)
+    put_targets(root, CHILDREN, [paths[node.name] for node in scene.roots])
+    return draft
 
 
-def bind_targets(draft: Draft, targets: list[MeshTargets]) -> None:
-    """Give the meshes with blend shapes their skeletons, and all skeletons one animation with zero weights.
+def finish(
+    draft: Draft,
+    targets: Sequence[MeshTargets],
+    motion: Motion | None = None,
+    weights: Mapping[str, Floats] | None = None,
+) -> None:
+    """Hang the meshes that blend shapes or joints move on one skeleton with one animation.
 
-    A skeleton stands beside the meshes that it is bound to: readers differ in whether a mesh without joints
-    follows its own transforms or its skeleton's, and so both are the same.
+    targets : of the shapes, in the order of the scene.
+    weights : see `formats.usd.animation.write_animation`.
     """
-    tokens = list(dict.fromkeys(token for target in targets for token in target.tokens))
-    if not tokens:
-        return
-    animation = UsdSkel.Animation.Define(draft.stage, draft.root.GetPath().AppendChild("Animation"))
-    animation.CreateBlendShapesAttr(tokens)
-    animation.CreateBlendShapeWeightsAttr(Vt.FloatArray.FromNumpy(np.zeros(len(tokens), np.float32)))
-    skeletons: set[Sdf.Path] = set()
-    for target in targets:
-        if not target.tokens:
-            continue
-        path = target.mesh.GetPath().GetParentPath().AppendChild("Skeleton")
-        if path not in skeletons:
-            _write_skeleton(draft.stage, path, animation.GetPath())
-            skeletons.add(path)
-        target.bind(path)
+    root = draft.root.GetPath()
+    skeleton, animation = root.AppendChild(SKELETON), root.AppendChild(ANIMATION)
+    tokens = dict.fromkeys(token for target in targets for token in target.tokens)
+    moved = False
+    for shape, target in zip(draft.scene.shapes, targets, strict=True):
+        if target.tokens:
+            target.bind()
+        if target.tokens or draft.rig.of_shape[shape.name]:
+            world = draft.scene.world_matrix(shape.name)
+            draft.rig.bind(target.mesh, shape, world, skeleton, draft.axes)
+            moved = True
+    if moved:
+        draft.rig.write(draft.stage, skeleton, draft.axes, animation)
+        write_animation(draft.stage, animation, tokens, draft.rig, draft.axes, motion, weights or {})
 
 
-def _write_skeleton(stage: Usd.Stage, path: Sdf.Path, animation: Sdf.Path) -> None:
-    skeleton = UsdSkel.Skeleton.Define(stage, path)
-    skeleton.CreateJointsAttr([JOINT])
-    skeleton.CreateBindTransformsAttr([Gf.Matrix4d(1.0)])
-    skeleton.CreateRestTransformsAttr([Gf.Matrix4d(1.0)])
-    binding = UsdSkel.BindingAPI.Apply(skeleton.GetPrim())
-    binding.CreateAnimationSourceRel().SetTargets([animation])
-
-
-def _write_tables(draft: Draft, face: AnimatableFace) -> None:
+def _write_tables(draft: Draft, face: AnimatableFace, motion: Motion | None) -> None:
     counts = {shape.name: shape.mesh.vertex_count for shape in face.scene.shapes}
-    transforms = {transform.name for transform in face.scene.transforms}
     targets = {name: draft.targets(name) for name in counts}
+    weights: dict[str, Floats] = {}
     scope = draft.stage.DefinePrim(draft.root.GetPath().AppendChild("Tables"), "Scope")
     put_targets(draft.root, "tables", [scope.GetPath()])
-    for table in face.tables:
+    for number, table in enumerate(face.tables):
         prim = draft.stage.DefinePrim(scope.GetPath().AppendChild(table.name), "Scope")
         put(prim, "fapID", Sdf.ValueTypeNames.Int, table.fap_id)
         put(prim, "highLevelSelect", Sdf.ValueTypeNames.Int, table.high_level_select)
         blends = []
         for mesh in table.meshes:
             check_indices(table, mesh, counts)
-            blends.append(write_face_def_mesh(targets[mesh.shape], table, mesh, face.fapu, draft.axes))
+            own = targets[mesh.shape]
+            blends.append(write_face_def_mesh(own, table, mesh, face.fapu, draft.axes))
+            if motion is not None:
+                weights[own.tokens[-1]] = motion.values[:, number] / full_value(table_borders(table))
         put_targets(prim, "meshes", blends)
-        for number, turn in enumerate(table.transforms):
-            if turn.transform not in transforms:
-                raise FaceDefTablesError(f"{table.name}: there is no transform '{turn.transform}' in the scene")
-            _write_face_def_transform(draft, prim.GetPath().AppendChild(f"transform_{number}"), turn)
-    bind_targets(draft, list(targets.values()))
+        for place, turn in enumerate(table.transforms):
+            _write_face_def_transform(draft, prim.GetPath().AppendChild(f"transform_{place}"), turn)
+    finish(draft, list(targets.values()), motion, weights)
 
 
 def _write_face_def_transform(draft: Draft, path: Sdf.Path, turn: FaceDefTransform) -> None:

@@ -69,6 +69,12 @@ def write_transform(prim: Usd.Prim, transform: Transform, axes: StageAxes) -> No
     xform.AddTranslateOp(double, _PIVOT, True)
 
 
+def write_matrix(prim: Usd.Prim, matrix: Gf.Matrix4d) -> None:
+    """Author a matrix as the one op of a prim; nothing for the identity."""
+    if matrix != Gf.Matrix4d(1.0):
+        UsdGeom.Xformable(prim).AddTransformOp(UsdGeom.XformOp.PrecisionDouble).Set(matrix)
+
+
 def _write_rotation(prim: Usd.Prim, op: UsdGeom.XformOp, name: str, rotation: Rotation, axes: StageAxes) -> None:
     x, y, z = axes.vector(rotation[:3])
     turned = (x, y, z, rotation[3])

@@ -68,7 +68,8 @@ def test_axes_that_usd_cannot_say_are_written_upright(tmp_path: Path, axes: np.n
 
 
 def _prim(stage: Usd.Stage, name: str) -> Usd.Prim:
-    return next(p for p in stage.Traverse() if p.GetName() == name)
+    """The mesh of this name, or what else has it: a material may have the name of a mesh."""
+    return min((p for p in stage.Traverse() if p.GetName() == name), key=lambda p: not p.IsA(UsdGeom.Mesh))
 
 
 def _world(stage: Usd.Stage, name: str) -> np.ndarray:

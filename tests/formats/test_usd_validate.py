@@ -13,7 +13,7 @@ from fba.errors import InputFileError
 from formats import usd
 from formats.usd.validate import validate_stage
 
-SKIN = "/small/head/skin"
+SKIN = "/small/skin"
 
 
 @pytest.fixture
