@@ -31,9 +31,9 @@ def correction_findings(unquantized: Encoder, encoder: Encoder, stream: FapStrea
     for fap_id, amount in encoder.clipped.items():
         off[fap_id] = max(amount, off.get(fap_id, 0))
     text = (
-        f"values that begin beyond {LARGEST_RANGE}, or change by more in a frame, cannot be sent as they are; too large "
-        f"by so much: {fap_list(unquantized.clipped)}. Values are rounded and what is missing stands in user "
-        "data, which this toolkit reads" + (f"; other decoders are off by up to: {fap_list(off)}" if off else "")
+        f"values that begin beyond {LARGEST_RANGE}, or change by more in a frame, cannot be sent as they are; too "
+        f"large by: {fap_list(unquantized.clipped)}. Values are rounded and what is missing stands in user data, "
+        "which this toolkit reads" + (f"; other decoders are off by up to: {fap_list(off)}" if off else "")
     )
     return [Finding("info", "fap-corrections", text), *frame_findings(stream)]
 

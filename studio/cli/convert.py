@@ -17,7 +17,7 @@ def convert(
     rate: StreamRate = None,
     quantizer: Annotated[
         int | None,
-        typer.Option(min=0, max=31, help=".fba: scale of the quantizer; default: 0 where it loses nothing, else 1."),
+        typer.Option(min=0, max=31, help=".fba: scale of the quantizer; default: nothing is lost."),
     ] = None,
     open_jaw: Annotated[
         Literal["strict", "practical"],
