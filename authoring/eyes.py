@@ -102,8 +102,6 @@ def _around(face: PreparedFace, pupil: str, ball: Ball) -> Floats:
 
 def dilate(face: PreparedFace, fap_id: int, value: int) -> Offsets:
     """FAP 29 or 30: the pupil's diameter grows by a value; empty where the eyeball has no ring around the pupil."""
-    from scipy.optimize import brentq
-
     key = SIDES[fap_id]
     joined = body(face, PUPILS[key])
     if joined is None or face.points[key].shape not in joined.names:
@@ -119,22 +117,12 @@ def dilate(face: PreparedFace, fap_id: int, value: int) -> Offsets:
     outside = float(radius[edge].mean()) if edge is not None else IRIS * face.fapu.irisd0
     inside = float(radius[rim].mean())
     front = (joined.vertices - center) @ gaze > 0.0
-    wanted = 0.5 * value * face.fapu.unit(fap(fap_id).unit)
-    before = np.linalg.norm(joined.vertices[rim] - pupil, axis=1).mean()
-
-    def moved(growth: float) -> Floats:
-        grown = np.interp(radius, [0.0, inside, outside], [0.0, growth, 0.0])
-        return _spread_from_axis(joined.vertices - center, gaze, np.where(front, grown, 0.0))
-
-    def missing(growth: float) -> float:
-        after = np.linalg.norm((joined.vertices + moved(growth))[rim] - pupil, axis=1).mean()
-        return float(after - before) - wanted
-
-    least, most = -0.999 * inside, 0.99 * (outside - inside)
-    if not missing(least) < 0.0 < missing(most):
+    growth = 0.5 * value * face.fapu.unit(fap(fap_id).unit)
+    if not -inside < growth < outside - inside:
         return {}
-    growth = float(brentq(missing, least, most, xtol=1e-14))
-    return {name: part for name, part in joined.split(moved(growth)).items() if part.any()}
+    grown = np.interp(radius, [0.0, inside, outside], [0.0, growth, 0.0])
+    moved = _spread_from_axis(joined.vertices - center, gaze, np.where(front, grown, 0.0))
+    return {name: part for name, part in joined.split(moved).items() if part.any()}
 
 
 def _ring(joined: Body, center: Floats, gaze: Floats, radius: Floats, wanted: float) -> Ints | None:

@@ -14,6 +14,7 @@ from fat.tables import FaceDefTable
 from fba.arrays import Floats
 from fba.faps import LOW_LEVEL_FAPS, Fap, Unit, fap
 from fba.scene import Role
+from fba.sphere import fit_sphere
 
 Kind = Literal["translation", "rotation", "roll", "dilation"]
 
@@ -28,6 +29,12 @@ TEST_ANGLE = 10_000
 
 _LARGEST_ANGLE = 150_000
 """AU; rotations are measured up to here, well below half a turn."""
+
+_RIM_SHARE = 0.95
+"""The rim of a pupil goes at least this share of the farthest way: its vertices lie on a ring that is nearly round."""
+
+_SQUINT = 0.8
+"""Cosine between an eye's neutral gaze and +Z; no face squints by 37 degrees, but half a ball's middle may be off."""
 
 _EYE_ROLES = {"3.5": Role.EYE_LEFT, "3.6": Role.EYE_RIGHT}
 _TONGUE_BORDERS = ("6.3", "6.4")
@@ -191,10 +198,7 @@ class Probe:
 
     def _dilation(self, point: str, world: _World) -> float | None:
         """Change of the pupil's diameter: twice the way outwards of the vertices that move most (its rim)."""
-        if not self._on_surface(point):
-            return None
-        center = self._rest[point]
-        names = self._eye_shapes(point)
+        names = self._eye_shapes(point) if self._on_surface(point) else []
         if not names:
             return None
         rest = np.concatenate([self._neutral[n] for n in names])
@@ -202,9 +206,36 @@ class Probe:
         way = np.linalg.norm(moved - rest, axis=1)
         if not way.max() > 0.0:
             return 0.0
-        rim = way > 0.95 * way.max()
-        grown = np.linalg.norm(moved[rim] - center, axis=1) - np.linalg.norm(rest[rim] - center, axis=1)
-        return 2.0 * float(grown.mean())
+        rim = way > _RIM_SHARE * way.max()
+        center = fit_sphere(rest)[0]
+        return 2.0 * widening(rest[rim], moved[rim] - rest[rim], self._rest[point] - center)
+
+
+def widening(rim: Floats, way: Floats, gaze: Floats) -> float:
+    """By how much the radius of a ring grows.
+
+    Parameters
+    ----------
+    rim, way : (n, 3) vertices on it and their offsets.
+    gaze : (3,) across the ring, of any length; +Z, where a neutral face looks, if it is far from that.
+
+    Notes
+    -----
+    Measured across the gaze, from the place where the lines of the ways meet. A pupil's rim lies on an iris or on
+    a bulge and goes up or down on it as well, which makes it no wider; and the feature point of the pupil lies on the
+    cornea before it, or beside the middle of a ring that a mesh has no round vertices for.
+    """
+    local = rim - rim.mean(axis=0)
+    if not gaze[2] > _SQUINT * np.linalg.norm(gaze):
+        gaze = np.array([0.0, 0.0, 1.0])
+    plane = np.linalg.svd(gaze[None])[2][1:]
+    places, ways = local @ plane.T, way @ plane.T
+    lengths = np.linalg.norm(ways, axis=1, keepdims=True)
+    across = (ways / np.maximum(lengths, 1e-300))[:, ::-1] * [-1.0, 1.0]
+    middle = np.linalg.lstsq(across, np.einsum("ij,ij->i", across, places), rcond=1e-6)[0]
+    outwards = places - middle
+    outwards /= np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-300)
+    return float(np.einsum("ij,ij->i", outwards, ways).mean())
 
 
 def rotation_vector(before: Floats, after: Floats) -> Floats:

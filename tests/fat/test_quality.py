@@ -48,8 +48,9 @@ def probe_face(errors: dict[int, float] | None = None) -> AnimatableFace:
     shapes = [Shape("skin", mesh(skin), Role.SKIN)]
     points = {k: FeaturePoint("skin", (n,), (1.0,)) for n, k in enumerate(SKIN)}
     for name, role, key, x in (("l", Role.EYE_LEFT, "3.5", 0.3), ("r", Role.EYE_RIGHT, "3.6", -0.3)):
-        ring = np.array([(np.cos(a) * 0.03, np.sin(a) * 0.03, 0.1) for a in np.arange(6)])
-        ball = np.concatenate([[[0, 0, 0.11]], ring, rng.normal(size=(20, 3)) * 0.05]) + np.array([x, 0.4, 1.0])
+        ring = np.array([(np.cos(a) * 0.03, np.sin(a) * 0.03, 0.1) for a in np.pi / 3 * np.arange(6)])
+        rest = rng.normal(size=(20, 3)) * 0.05
+        ball = np.concatenate([[[0, 0, 0.11]], ring, rest, rest * [-1, -1, 1]]) + np.array([x, 0.4, 1.0])
         shapes.append(Shape(name, mesh(ball), role))
         points[key] = FeaturePoint(name, (0,), (1.0,))
     scene = FaceScene(tuple(shapes))
@@ -94,9 +95,8 @@ def low_level_motion(scene: FaceScene, points: dict, number: int, value: float) 
     if f.direction is None:
         out = vertices[1:7] - vertices[0]
         out[:, 2] = 0
-        center = np.linalg.norm(vertices[1:7] - vertices[0], axis=1)
-        grown = np.sqrt((center + amount / 2) ** 2 - 0.01**2)
-        offsets[1:7] = out / 0.03 * (grown - 0.03)[:, None]
+        offsets[1:7] = out / 0.03 * (amount / 2)
+        offsets[1:7, 2] = -0.3 * abs(amount)  # down on a bulge, which makes the pupil no wider
         return {point.shape: offsets}
     direction = np.array(f.direction)
     offsets[point.vertices[0]] = amount * (direction + 0.3 * direction[[1, 2, 0]])
