@@ -12,6 +12,7 @@ from fat.face import AnimatableFace
 from fba.errors import InputFileError
 from fba.findings import Finding
 from fba.scene import FaceScene
+from fba.stream import FapStream
 from formats.vrml97.document import VrmlDocument
 from formats.vrml97.parser import parse
 from formats.vrml97.printer import HEADER, print_tree
@@ -19,7 +20,7 @@ from formats.vrml97.reader import assemble
 from formats.vrml97.text import read_text, write_text
 from formats.vrml97.writer import declarations, pieces
 
-__all__ = ["VrmlDocument", "parse", "print_tree", "read", "write"]
+__all__ = ["VrmlDocument", "parse", "print_tree", "read", "write", "write_portable"]
 
 
 def read(path: Path) -> FaceScene | AnimatableFace:
@@ -56,6 +57,19 @@ def to_text(face: FaceScene | AnimatableFace) -> str:
     if built.face is not None:
         statements = (*declarations(built.face), *statements, built.face)
     return HEADER + print_tree(statements)
+
+
+def write_portable(face: FaceScene | AnimatableFace, path: Path, stream: FapStream | None = None) -> None:
+    """Write a file that plays in every browser with Scripts; see `formats.vrml97.portable`. It reads back the same.
+
+    Raises
+    ------
+    UnsupportedFeatureError
+        If two tables drive one field of one transform.
+    """
+    from formats.vrml97.portable import portable_statements
+
+    write_text(HEADER + print_tree(portable_statements(face, stream)), Path(path))
 
 
 def _stem(path: Path) -> str:

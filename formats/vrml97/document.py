@@ -13,6 +13,9 @@ from formats.vrml97.tree import BodyItem, Field, Nodes, Proto, Raw, Statement, S
 METADATA_DEF = "fba_toolkit"
 """DEF name of the WorldInfo that carries what the standard's nodes cannot say."""
 
+PLAYER_DEF = "fba_player"
+"""DEF name of the Group with everything that plays a stream on a Face in browsers."""
+
 MPEG4_NODES = frozenset(
     {"Face", "FDP", "FAP", "FIT", "FaceDefTables", "FaceDefMesh", "FaceDefTransform", "Viseme", "Expression"}
 )
@@ -25,7 +28,7 @@ class VrmlDocument:
     Attributes
     ----------
     statements : the file without its Face nodes (their scene graph stands in their place), without
-        declarations of the MPEG-4 nodes and without this toolkit's WorldInfo; every DEF is unique.
+        declarations of the MPEG-4 nodes and without this toolkit's WorldInfo and player; every DEF is unique.
     nodes : name of a shape or transform of the scene -> its node in `statements`.
     parts : the same names -> the shape or transform as it was read, file axes.
     face_fields : fields of the file's Face node that go out with the next Face: fit and ttsSource.
@@ -77,6 +80,8 @@ class _Splitter:
                 continue
             if not isinstance(item, VrmlNode):
                 out.append(item)
+            elif item.def_name == PLAYER_DEF and item.type == "Group":
+                continue
             elif item.type == "Face":
                 self.faces.append(item)
                 out.extend(self.scene_graph(item))
