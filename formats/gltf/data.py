@@ -6,6 +6,7 @@ import base64
 import binascii
 import json
 import math
+from functools import cached_property
 from pathlib import Path
 from typing import cast
 from urllib.parse import unquote
@@ -22,8 +23,10 @@ Json = dict[str, object]
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _COMPRESSION = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
-_MOST_ZEROS = 1 << 26
-"""Numbers in an accessor without data: as much as a 500 MB file of plain positions would hold."""
+_MOST_NUMBERS, _NUMBERS_A_BYTE = 1 << 26, 8
+"""Numbers that the accessors of a file may hold together, as they are asked for: so many, and so many more for each of
+its bytes. Accessors share bytes or, sparse, need none, so that a small file could fill any memory; 700 morph targets of
+24,000 vertices are 50 million."""
 
 
 class GltfData:
@@ -58,6 +61,8 @@ class GltfData:
         if packed:
             raise UnsupportedFeatureError(f"{path} is compressed ({packed[0]}); save it without mesh compression")
         self._buffers: dict[int, bytes] = {}
+        self._file_bytes = len(data)
+        self._numbers = 0
 
     @staticmethod
     def _no_constant(name: str) -> float:
@@ -183,10 +188,13 @@ class GltfData:
         kind = self._component(accessor)
         if "bufferView" in accessor:
             with np.errstate(invalid="ignore"):  # Such values are refused below.
-                values = self._view(accessor, kind, count, width).astype(np.float64)
+                view = self._view(accessor, kind, count, width)
+                self._spend(view.size)
+                values = view.astype(np.float64)
         else:
-            if count * width > _MOST_ZEROS:
+            if count > self._all_bytes:
                 raise self.fail(f"accessor {index} has {count} elements but no data")
+            self._spend(count * width)
             values = np.zeros((count, width))
         if "sparse" in accessor:
             self._apply_sparse(self.dict(accessor, "sparse"), values, kind, count, width)
@@ -195,6 +203,18 @@ class GltfData:
         if not np.isfinite(values).all():
             raise self.fail(f"accessor {index} holds values that are not finite numbers")
         return values
+
+    @cached_property
+    def _all_bytes(self) -> int:
+        """Bytes of the file and of the buffers beside it."""
+        count = len(self.list(self.document, "buffers"))
+        return self._file_bytes + sum(len(self._buffer(k)) for k in range(count))
+
+    def _spend(self, count: int) -> None:
+        """Keep to a bounded amount of numbers, before memory is taken for them."""
+        self._numbers += count
+        if self._numbers > _MOST_NUMBERS and self._numbers > _MOST_NUMBERS + _NUMBERS_A_BYTE * self._all_bytes:
+            raise self.fail(f"its accessors share bytes or have none, and hold over {self._numbers} numbers together")
 
     def indices(self, index: object) -> NDArray[np.int64]:
         """A scalar accessor as whole numbers."""
