@@ -67,13 +67,13 @@ class PolyMesh:
             ),
             ("normal", self.normal_indices, 0 if self.normals is None else len(self.normals)),
         ):
-            if values is None or values.size == 0:
+            if values is None:
                 continue
-            low = 0 if name == "vertex" else -1
-            if int(values.min()) < low or int(values.max()) >= count:
-                raise MeshError(f"a polygon uses a {name} index outside 0..{count - 1}")
             if values.size != self.indices.size:
                 raise MeshError(f"{name} indices must match the {self.indices.size} corners")
+            low = 0 if name == "vertex" else -1
+            if values.size and (int(values.min()) < low or int(values.max()) >= count):
+                raise MeshError(f"a polygon uses a {name} index outside 0..{count - 1}")
         for name in ("face_groups", "face_materials"):
             values = getattr(self, name)
             if values is not None and values.size != self.face_count:
