@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from fba.arrays import Bools, Floats, Ints, frozen
 from fba.errors import MeshError
+from fba.shading import Shading
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,3 +274,19 @@ class Material:
     transparency: float = 0.0
     texture: str | None = field(default=None)
     """The image's path or URI exactly as the file wrote it."""
+    shading: Shading | None = None
+    """What a physically based renderer needs beyond this; None where the file does not say."""
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """All images that the material names, each once; the texture first."""
+        maps = () if self.shading is None else self.shading.maps
+        named = (self.texture or "", *(m.image for m in maps))
+        return tuple(dict.fromkeys(name for name in named if name))
+
+    def renamed(self, names: Mapping[str, str]) -> Material:
+        """The same material with other names of its images; those without a new one keep theirs."""
+
+        texture = None if self.texture is None else names.get(self.texture, self.texture)
+        shading = None if self.shading is None else self.shading.renamed(names)
+        return replace(self, texture=texture, shading=shading)

@@ -157,6 +157,8 @@ class FaceScene:
     document : what the file held besides geometry, kept by the reader of that format for its own writer.
     folder : of the file, where the images lie that materials name; None if it was not read from one.
     images : the images that were inside the file, by the names that materials give them.
+    vertex_attributes : (N, k) values in the file's own vertex order, NaN where a vertex has none: "color" (k = 3, or
+        4 with opacity; linear light) and "texcoord_1" and above (k = 2, from the lower left corner of the image).
     """
 
     roots: tuple[Node, ...]
@@ -166,6 +168,7 @@ class FaceScene:
     document: object | None = None
     folder: Path | None = None
     images: Mapping[str, bytes] = field(default_factory=dict)
+    vertex_attributes: Mapping[str, Floats] = field(default_factory=dict)
 
     def walk(self) -> Iterator[tuple[Node, tuple[Transform, ...]]]:
         """Yield every node, parents first, with its chain of parent transforms (outermost first)."""

@@ -130,7 +130,8 @@ def write(
 ) -> None:
     """Write a face; the extension chooses the format. The file is written whole or not at all.
 
-    Images that materials name are put beside it, where the format does not hold them and they are not there yet.
+    Images that materials name are put beside it, where the format does not hold them and they are not there yet; one
+    whose name another image there has gets a new name, in the file too.
 
     stream : becomes the file's animation.
     portable : for clients of the format that know no MPEG-4 nodes.
@@ -153,12 +154,15 @@ def write(
         raise UnsupportedFeatureError(f"{path}: {entry.name} is written without animation; choose one of {known}")
     if stream is not None and scene is face:
         raise UnsupportedFeatureError(f"'{scene.name}' has no Facial Animation Tables, so a FAP stream cannot move it")
+    placed = place_textures(scene, path.parent) if entry.names_images else None
+    if placed is not None and placed.scene is not scene:
+        face = replace(face, scene=placed.scene) if isinstance(face, AnimatableFace) else placed.scene
     if portable:
         _load(entry, "write_portable")(face, path, stream)
     else:
         _load(entry, "write")(*((face, path) if stream is None else (face, path, stream)))
-    if entry.names_images:
-        place_textures(scene, path.parent)
+    if placed is not None:
+        placed.write()
 
 
 def _extensions(of: Callable[[Format], bool]) -> str:

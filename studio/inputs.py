@@ -10,7 +10,7 @@ from fba.findings import Finding
 from fba.orientation import orient
 from fba.scene import FaceScene
 from formats.landmarks import landmarks_beside, read_landmarks
-from formats.textures import texture_names
+from formats.textures import left_out, missing_textures
 
 
 def scene_of(found: FaceScene | AnimatableFace) -> FaceScene:
@@ -28,32 +28,27 @@ def points_of(found: FaceScene | AnimatableFace, file: Path, landmarks: Path | N
     return None if beside is None else read_landmarks(beside, scene_of(found))
 
 
-def missing_textures(scene: FaceScene, folder: Path) -> list[str]:
-    """Textures that the materials name, but that are neither in the file read nor where one in `folder` looks."""
-    return [name for name in _absent(scene, folder) if name not in scene.images]
-
-
-def _absent(scene: FaceScene, folder: Path) -> list[str]:
-    named = [name for name in texture_names(scene) if ":/" not in name]
-    return [name for name in named if not (folder / name.replace("\\", "/")).exists()]
-
-
 def remarks_of(scene: FaceScene) -> list[Finding]:
     """What the reader of a file had to leave out or to guess."""
     return [Finding("info", "file", remark) for remark in getattr(scene.document, "remarks", ())]
 
 
 def left_behind(scene: FaceScene, read_from: Path, written_to: Path) -> list[Finding]:
-    """Textures that lie beside or in the file that was read, but neither beside nor in the one that was written."""
-    gone = set(missing_textures(scene, read_from.parent))
+    """Textures that the file that was read names, but that are neither beside nor in the one that was written."""
+    gone = missing_textures(scene)
     if written_to.suffix.lower() in (".glb", ".gltf"):
-        from formats.gltf.materials import left_out
+        from formats.gltf.materials import left_out as not_in_gltf
 
-        lost, advice = left_out(scene), "make a PNG or JPEG, which glTF can hold, of the texture {}"
+        lost, advice = not_in_gltf(scene), "make a PNG or JPEG, which glTF can hold, of the texture {}"
     else:
-        lost = _absent(scene, written_to.parent)
-        advice = "copy the texture {} from " + str(read_from.parent) + " to the new folder"
-    return [
+        lost = left_out(scene)
+        advice = "the texture {} is no image of a known kind and is not copied; make a PNG or JPEG of it"
+    folder = read_from.parent
+    found = [
+        Finding("warning", "texture-missing", f"{name}: {read_from.name} names this texture, but it is not in {folder}")
+        for name in gone
+    ]
+    return found + [
         Finding("warning", "texture-left-behind", advice.replace("{}", name, 1)) for name in lost if name not in gone
     ]
 

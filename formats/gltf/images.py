@@ -6,8 +6,9 @@ import re
 from urllib.parse import unquote
 
 from formats.gltf.data import GltfData, Json
+from formats.image_kinds import image_type
 
-_EXTENSIONS = {"image/png": ".png", "image/jpeg": ".jpg"}
+_EXTENSIONS = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp"}
 
 
 class Images:
@@ -32,17 +33,15 @@ class Images:
 
     def _find(self, image: Json, index: object) -> str | None:
         uri = image.get("uri")
-        kind = str(image.get("mimeType", ""))
         if isinstance(uri, str) and not uri.startswith("data:"):
             return unquote(uri)
         if isinstance(uri, str):
-            kind = uri[5:].partition(",")[0].partition(";")[0]
             content = self._data.inline(uri, f"image {index}")
         elif "bufferView" in image:
             content = self._data.bytes_of(image["bufferView"])
         else:
             return None
-        name = self._free(self._data.name(image) or f"image_{index}", _EXTENSIONS.get(kind, ""))
+        name = self._free(self._data.name(image) or f"image_{index}", _EXTENSIONS.get(image_type(content) or "", ""))
         self.inside[name] = content
         return name
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,10 @@ from fba.errors import FbaError, InputFileError
 from fba.faps import FAP_COUNT
 from fba.fapu import Fapu
 from fba.feature_points import FeaturePoint, FeaturePoints
-from fba.mesh import Material, PolyMesh
+from fba.mesh import PolyMesh
 from fba.scene import FaceScene, Frame, Node, Role, Shape, Transform
 from formats.gltf.buffers import Buffer, Json
+from formats.material_json import material_json, read_material
 from formats.targets import table_borders, target_name
 
 FORMAT = "fba-gltf/1"
@@ -63,7 +64,7 @@ class Pack:
 
 def _exact_kind(values: NDArray[Any]) -> str:
     if values.dtype.kind == "f":
-        single = values.dtype == np.float32 or np.array_equal(values.astype(np.float32), values)
+        single = values.dtype == np.float32 or np.array_equal(values.astype(np.float32), values, equal_nan=True)
         return "<f4" if single else "<f8"
     low, high = int(values.min(initial=0)), int(values.max(initial=0))
     return next(kind for kind in _INTEGERS if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max)
@@ -97,6 +98,7 @@ def scene_json(scene: FaceScene, pack: Pack) -> Json:
         "reversedWinding": scene.frame.reversed_winding,
         "metersPerUnit": scene.meters_per_unit,
         "roots": [_node_json(node, pack) for node in scene.roots],
+        "vertexAttributes": {name: pack.array(values) for name, values in scene.vertex_attributes.items()},
     }
 
 
@@ -111,7 +113,7 @@ def _node_json(node: Node, pack: Pack) -> Json:
         "role": node.role.value,
         "mesh": {name: pack.array(values) for name, values in arrays.items() if values is not None},
         "groupNames": list(mesh.group_names),
-        "materials": [asdict(material) for material in node.materials],
+        "materials": [material_json(material) for material in node.materials],
         "vertexIds": None if node.vertex_ids is None else pack.array(node.vertex_ids),
     }
 
@@ -190,7 +192,11 @@ def _read_scene(own: Any, unpack: Unpack) -> FaceScene:
     frame = Frame(np.array(own["axes"], dtype=np.float64), bool(own["reversedWinding"]))
     meters = own["metersPerUnit"]
     roots = tuple(_read_node(node, unpack) for node in own["roots"])
-    return FaceScene(roots, frame, None if meters is None else float(meters), str(own["name"]))
+    attributes = {str(k): unpack.array(where, np.float64) for k, where in own.get("vertexAttributes", {}).items()}
+    scene = FaceScene(roots, frame, None if meters is None else float(meters), str(own["name"]))
+    if any(values.ndim != 2 or len(values) != scene.vertex_count for values in attributes.values()):
+        raise InputFileError("a vertex attribute has another number of values than there are vertices")
+    return replace(scene, vertex_attributes=attributes)
 
 
 def _read_node(own: Any, unpack: Unpack) -> Node:
@@ -205,23 +211,9 @@ def _read_node(own: Any, unpack: Unpack) -> Node:
     }
     mesh = PolyMesh(group_names=tuple(str(name) for name in own["groupNames"]), **arrays)
     ids = own["vertexIds"]
-    materials = tuple(_read_material(material) for material in own["materials"])
+    materials = tuple(read_material(material) for material in own["materials"])
     vertex_ids = None if ids is None else unpack.array(ids, np.int32)
     return Shape(str(own["shape"]), mesh, Role(own["role"]), materials, vertex_ids)
-
-
-def _read_material(own: Any) -> Material:
-    texture = own["texture"]
-    return Material(
-        str(own["name"]),
-        diffuse=_floats(own["diffuse"], 3),
-        ambient_intensity=float(own["ambient_intensity"]),
-        specular=_floats(own["specular"], 3),
-        emissive=_floats(own["emissive"], 3),
-        shininess=float(own["shininess"]),
-        transparency=float(own["transparency"]),
-        texture=None if texture is None else str(texture),
-    )
 
 
 def _floats(values: Any, count: int) -> Any:

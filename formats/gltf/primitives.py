@@ -6,7 +6,7 @@ meet.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -108,14 +108,23 @@ def _unit(normals: Floats) -> Floats:
     return unit
 
 
-def write_mesh(buffer: Buffer, shape: Shape, targets: Sequence[Target], materials: Materials) -> Json | None:
-    """A glTF mesh with morph targets; None without polygons."""
+def write_mesh(
+    buffer: Buffer,
+    shape: Shape,
+    targets: Sequence[Target],
+    materials: Materials,
+    attributes: Mapping[str, Floats],
+) -> Json | None:
+    """A glTF mesh with morph targets; None without polygons.
+
+    attributes : of the shape's vertices, as `FaceScene.vertex_attributes`.
+    """
     to_single(shape.mesh.vertices)  # Refused here, before anything is computed with them.
     smooth = SmoothNormals(shape.mesh)
     primitives = split(shape, smooth.rest)
     if not primitives:
         return None
-    entries = [_write_primitive(buffer, shape, p, materials) for p in primitives]
+    entries = [_write_primitive(buffer, shape, p, materials, attributes) for p in primitives]
     for target in targets:
         index, offsets = target.index, target.offsets
         turned = to_single(smooth.offsets(index, offsets))
@@ -134,16 +143,42 @@ def write_mesh(buffer: Buffer, shape: Shape, targets: Sequence[Target], material
     return mesh
 
 
-def _write_primitive(buffer: Buffer, shape: Shape, primitive: Primitive, materials: Materials) -> Json:
+def _write_primitive(
+    buffer: Buffer, shape: Shape, primitive: Primitive, materials: Materials, extra: Mapping[str, Floats]
+) -> Json:
     points: Floats32 = to_single(shape.mesh.vertices[primitive.vertices])
     attributes: dict[str, Any] = {
         "POSITION": buffer.attribute(points, bounds=True),
         "NORMAL": buffer.attribute(to_single(primitive.normals)),
         VERTEX: buffer.attribute(primitive.vertices.astype(np.float32)),
     }
-    if primitive.texcoords is not None:
-        attributes["TEXCOORD_0"] = buffer.attribute(to_single(primitive.texcoords))
+    texcoords = _texcoords(primitive, extra)
+    attributes |= {f"TEXCOORD_{k}": buffer.attribute(to_single(uv)) for k, uv in enumerate(texcoords)}
+    colors = _known(extra.get("color"), primitive.vertices, 1.0)
+    if colors is not None:
+        attributes["COLOR_0"] = buffer.attribute(to_single(np.clip(colors, 0.0, 1.0)))
     entry: Json = {"attributes": attributes, "indices": buffer.indices(primitive.triangles.ravel())}
     if primitive.material >= 0:
-        entry["material"] = materials.number(shape.materials[primitive.material], primitive.texcoords is not None)
+        entry["material"] = materials.number(shape.materials[primitive.material], len(texcoords))
     return entry
+
+
+def _texcoords(primitive: Primitive, extra: Mapping[str, Floats]) -> list[Floats]:
+    """All sets of texture coordinates, from the upper left corner; glTF numbers them without gaps."""
+    sets = [] if primitive.texcoords is None else [primitive.texcoords]
+    while (values := _known(extra.get(f"texcoord_{max(len(sets), 1)}"), primitive.vertices, 0.0)) is not None:
+        if not sets:
+            sets.append(np.zeros_like(values))
+        sets.append(np.stack([values[:, 0], 1.0 - values[:, 1]], axis=1))
+    return sets
+
+
+def _known(values: Floats | None, vertices: Ints, default: float) -> Floats | None:
+    """Values of these vertices, with a default where there is none; None where there is none at all."""
+    if values is None:
+        return None
+    found = values[vertices]
+    if np.isnan(found).all():
+        return None
+    filled: Floats = np.where(np.isnan(found), default, found)
+    return filled

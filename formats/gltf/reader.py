@@ -8,18 +8,16 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fba.arrays import Floats
 from fba.errors import MeshError
-from fba.mesh import Material, PolyMesh
 from fba.scene import FaceScene, Node, Shape, Transform
-from formats.gltf.colors import from_linear
 from formats.gltf.data import GltfData, Json
 from formats.gltf.images import Images
+from formats.gltf.read_primitives import MODES, TRIANGLES, ReadPrimitive, joined, joined_attributes
+from formats.gltf.surfaces import Surfaces
 from formats.matrices import transform_fields
 
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _DEEPEST = 200
 
 
@@ -72,6 +70,8 @@ class _Reader:
         self.skinned: list[Node] = []
         self.remarks: list[str] = []
         self.images = Images(data)
+        self.surfaces = Surfaces(data, self.images)
+        self.attributes: dict[str, dict[str, Floats]] = {}
 
     def scene(self) -> FaceScene:
         roots: list[Node] = []
@@ -83,8 +83,22 @@ class _Reader:
         scene = FaceScene(tuple(roots), meters_per_unit=1.0, name=self.data.path.stem)
         if not any(s.mesh.face_count for s in scene.shapes):
             raise MeshError(f"{self.data.path} holds no triangles in its default scene")
-        document = GltfDocument(self.targets, tuple(dict.fromkeys(self.remarks)))
-        return replace(scene, document=document, images=self.images.inside)
+        document = GltfDocument(self.targets, tuple(dict.fromkeys(self.remarks + self.surfaces.remarks)))
+        extra = self._vertex_attributes(scene)
+        return replace(scene, document=document, images=self.images.inside, vertex_attributes=extra)
+
+    def _vertex_attributes(self, scene: FaceScene) -> dict[str, Floats]:
+        """Colours and further texture coordinates of all vertices; NaN where a mesh has none."""
+        widths: dict[str, int] = {}
+        for own in self.attributes.values():
+            for name, values in own.items():
+                widths[name] = max(widths.get(name, 0), values.shape[1])
+        found = {name: np.full((scene.vertex_count, width), np.nan) for name, width in sorted(widths.items())}
+        for shape, places in scene.file_order().items():
+            for name, values in self.attributes[shape].items():
+                found[name][places, : values.shape[1]] = values
+                found[name][places, values.shape[1] :] = 1.0  # Colours without alpha are opaque.
+        return found
 
     def _root_nodes(self) -> list[object]:
         data = self.data
@@ -148,23 +162,24 @@ class _Reader:
         for entry in data.list(mesh, "primitives"):
             if not isinstance(entry, dict):
                 raise data.fail("a primitive must be an object")
-            if data.integer(entry, "mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
+            if data.integer(entry, "mode", TRIANGLES) not in MODES:
                 self.remarks.append("points and lines are skipped: only triangles are read")
                 continue
-            parts.append(_Primitive(data, entry))
+            parts.append(ReadPrimitive(data, entry))
         if not parts:
             return None
         name = self._unique(data.name(node) or data.name(mesh) or "mesh")
-        joined, materials = _joined(data, parts, self.images)
+        mesh_of_all, materials = joined(data, parts, self.surfaces)
+        self.attributes[name] = joined_attributes(parts)
         self.targets[name] = self._targets(parts, names)
-        return Shape(name, joined, materials=materials)
+        return Shape(name, mesh_of_all, materials=materials)
 
     def _target_names(self, mesh: Json) -> list[str]:
         extras = mesh.get("extras")
         names = extras.get("targetNames") if isinstance(extras, dict) else None
         return [str(n) for n in names] if isinstance(names, list) else []
 
-    def _targets(self, parts: list[_Primitive], names: list[str]) -> dict[str, Floats]:
+    def _targets(self, parts: list[ReadPrimitive], names: list[str]) -> dict[str, Floats]:
         count = max((len(p.targets) for p in parts), default=0)
         labels = [names[k] if k < len(names) else f"target_{k}" for k in range(count)]
         out: dict[str, Floats] = {}
@@ -174,111 +189,3 @@ class _Reader:
                 raise self.data.fail(f"two morph targets of a mesh have the name '{label[:60]}'")
             out[label] = np.concatenate(offsets)
         return out
-
-
-class _Primitive:
-    """One primitive: positions, triangles and what hangs on them."""
-
-    def __init__(self, data: GltfData, primitive: Json) -> None:
-        self.data = data
-        attributes = data.dict(primitive, "attributes")
-        if "POSITION" not in attributes:
-            raise data.fail("a primitive has no POSITION")
-        self.positions = data.accessor(attributes["POSITION"], "VEC3")
-        count = len(self.positions)
-        order = data.indices(primitive["indices"]) if "indices" in primitive else np.arange(count)
-        if order.size and int(order.max()) >= count:
-            raise data.fail(f"a triangle uses vertex {int(order.max())} of {count}")
-        self.triangles = _triangles(order, data.integer(primitive, "mode", _TRIANGLES))
-        self.normals = self._optional(attributes, "NORMAL", "VEC3")
-        self.texcoords = self._optional(attributes, "TEXCOORD_0", "VEC2")
-        self.material = primitive.get("material")
-        self.targets = data.list(primitive, "targets")
-
-    def _optional(self, attributes: Json, name: str, type_name: str) -> Floats | None:
-        if name not in attributes:
-            return None
-        values = self.data.accessor(attributes[name], type_name)
-        if len(values) != len(self.positions):
-            raise self.data.fail(f"{name} has {len(values)} values for {len(self.positions)} vertices")
-        return values
-
-    def target(self, number: int) -> Floats:
-        """(n, 3) position offsets of a morph target; zeros where it has none."""
-        target = self.targets[number] if number < len(self.targets) else {}
-        if not isinstance(target, dict):
-            raise self.data.fail("a morph target must be an object")
-        offsets = self._optional(target, "POSITION", "VEC3")
-        return np.zeros_like(self.positions) if offsets is None else offsets
-
-
-def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
-    """(t, 3) vertex numbers of triangles, a strip or a fan."""
-    if mode == _TRIANGLES:
-        return order[: order.size // 3 * 3].reshape(-1, 3)
-    count = max(order.size - 2, 0)
-    step = np.arange(count)
-    if mode == _FAN:
-        return np.stack([np.broadcast_to(order[:1], count) if count else step, order[1 : count + 1], order[2:]], axis=1)
-    odd = step % 2
-    return np.stack([order[step], order[step + 1 + odd], order[step + 2 - odd]], axis=1)
-
-
-def _joined(data: GltfData, parts: list[_Primitive], images: Images) -> tuple[PolyMesh, tuple[Material, ...]]:
-    """All primitives of a mesh as one, vertices one primitive after the other."""
-    starts = np.cumsum([0, *(len(p.positions) for p in parts)])
-    corners = np.concatenate([p.triangles + s for p, s in zip(parts, starts[:-1], strict=True)]).astype(np.int32)
-    indices = corners.ravel()
-    used: dict[int, int] = {}
-    for p in parts:
-        if p.material is not None:
-            data.item("materials", p.material)
-            used.setdefault(cast("int", p.material), len(used))
-    numbers = [-1 if p.material is None else used[cast("int", p.material)] for p in parts]
-    texcoords = _column([p.texcoords for p in parts], parts, 2)
-    normals = _column([p.normals for p in parts], parts, 3)
-    if texcoords is not None:
-        # glTF counts v from the top of the image.
-        texcoords = np.stack([texcoords[:, 0], 1.0 - texcoords[:, 1]], axis=1)
-    mesh = PolyMesh(
-        np.concatenate([p.positions for p in parts]),
-        indices,
-        np.arange(0, indices.size + 1, 3, dtype=np.int32),
-        texcoords,
-        None if texcoords is None else indices,
-        normals,
-        None if normals is None else indices,
-        face_materials=np.repeat(np.array(numbers, dtype=np.int32), [len(p.triangles) for p in parts])
-        if used
-        else None,
-    )
-    return mesh, tuple(_material(data, i, images) for i in used)
-
-
-def _column(values: list[Floats | None], parts: list[_Primitive], width: int) -> Floats | None:
-    if any(v is None for v in values):
-        return None
-    column: Floats = np.concatenate([v for v in values if v is not None]) if parts else np.zeros((0, width))
-    return column
-
-
-def _material(data: GltfData, index: int, images: Images) -> Material:
-    entry = data.item("materials", index)
-    surface = data.dict(entry, "pbrMetallicRoughness")
-    *color, alpha = data.numbers(surface, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
-    return Material(
-        data.name(entry) or f"material_{index}",
-        diffuse=from_linear(color),
-        emissive=from_linear(data.numbers(entry, "emissiveFactor", (0.0, 0.0, 0.0))),
-        transparency=1.0 - alpha if entry.get("alphaMode") == "BLEND" else 0.0,
-        texture=_texture(data, surface, images),
-    )
-
-
-def _texture(data: GltfData, surface: Json, images: Images) -> str | None:
-    """The name of the base colour image."""
-    reference = data.dict(surface, "baseColorTexture")
-    if "index" not in reference:
-        return None
-    source = data.item("textures", reference["index"]).get("source")
-    return None if source is None else images.name(source)

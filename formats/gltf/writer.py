@@ -51,7 +51,9 @@ class Draft:
         self.own: Json = {"format": FORMAT, "scene": scene_json(scene, self._pack)}
 
     def _mesh(self, shape: Shape) -> int | None:
-        mesh = write_mesh(self.buffer, shape, self._targets.get(shape.name, ()), self._materials)
+        places = self.scene.file_order()[shape.name]
+        extra = {name: values[places] for name, values in self.scene.vertex_attributes.items()}
+        mesh = write_mesh(self.buffer, shape, self._targets.get(shape.name, ()), self._materials, extra)
         if mesh is None:
             return None
         self._meshes.append(mesh)

@@ -18,8 +18,9 @@ from fba.errors import FbaError
 from fba.fapu import Fapu
 from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.findings import Finding
-from fba.mesh import Material, PolyMesh
+from fba.mesh import PolyMesh
 from fba.scene import FaceScene, Frame, Role, Shape
+from formats.material_json import material_json, read_material
 from formats.vrml97.document import METADATA_DEF
 from formats.vrml97.names import unescape
 from formats.vrml97.tree import Strings, VrmlNode, node
@@ -80,7 +81,7 @@ def _steps(values: Ints) -> list[list[int]]:
 def _shape_row(shape: Shape) -> dict[str, Any]:
     mesh = shape.mesh
     row: dict[str, Any] = {"name": shape.name, "role": shape.role.value}
-    row["materials"] = [asdict(m) for m in shape.materials]
+    row["materials"] = [material_json(m) for m in shape.materials]
     if shape.vertex_ids is not None:
         row["vertex_ids"] = _steps(shape.vertex_ids)
     if mesh.group_names:
@@ -210,7 +211,7 @@ def apply_to_shape(shape: Shape, row: Mapping[str, Any], findings: list[Finding]
     try:
         mesh = shape.mesh
         changes: dict[str, Any] = {}
-        materials = tuple(_material(m) for m in row["materials"])
+        materials = tuple(read_material(m) for m in row["materials"])
         groups = changes["group_names"] = tuple(str(n) for n in row.get("group_names", ()))
         ends = {"face_groups": (0, len(groups) or mesh.face_count), "face_materials": (-1, len(materials))}
         for name, (low, count) in ends.items():
@@ -251,8 +252,3 @@ def _unstep(pairs: Any, count: int) -> Ints:
     rows = _checked(pairs, count, 0)
     parts = [np.arange(a, a + b, dtype=np.int32) for a, b in rows]
     return np.concatenate(parts) if parts else np.zeros(0, np.int32)
-
-
-def _material(row: Any) -> Material:
-    fields: dict[str, Any] = {k: tuple(map(float, v)) if isinstance(v, list) else v for k, v in row.items()}
-    return Material(**fields)

@@ -48,13 +48,14 @@ def _face(file: Path, landmarks: Path | None) -> tuple[dict[str, Any], list[Any]
     from fat.face import AnimatableFace
     from fba.findings import Finding
     from formats import read
+    from formats.textures import missing_textures
     from studio.describe import describe_face, describe_points, describe_scene, mesh_findings
-    from studio.inputs import missing_textures, remarks_of, scene_of, target_points
+    from studio.inputs import remarks_of, scene_of, target_points
 
     found = read(file)
     textures = [
         Finding("warning", "no-texture", f"the texture file {name} is not there")
-        for name in missing_textures(scene_of(found), file.parent)
+        for name in missing_textures(scene_of(found))
     ]
     if isinstance(found, AnimatableFace):
         about, findings = describe_face(found)

@@ -514,10 +514,10 @@ def test_textures_come_along_or_are_named(tmp_path: Path) -> None:
         "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 0 1 0 ] } coordIndex [ 0 1 2 ] } }\n"
     )
     assert "skin.png is not there" in fba("inspect", head).stdout
-    (tmp_path / "skin.png").touch()
-    assert "is not there" not in fba("inspect", head).stdout
     (tmp_path / "new").mkdir()
-    assert "copy the texture skin.png" in fba("export", head, "-o", tmp_path / "new" / "head.usda").stdout
+    assert "skin.png: head.wrl names this texture" in fba("export", head, "-o", tmp_path / "new" / "head.usda").stdout
+    (tmp_path / "skin.png").write_bytes(b"no image")
+    assert "is not there" not in fba("inspect", head).stdout
     assert "PNG or JPEG" in fba("export", head, "-o", tmp_path / "new" / "head.glb").stdout
     (tmp_path / "skin.png").write_bytes(b"\x89PNG\r\n\x1a\n")
     for name in ("new/head.usda", "new/head.glb", "head.usda"):
