@@ -30,7 +30,9 @@ register(
         portable=True,
     )
 )
-register(Format("MPEG-4 BT", (".bt", ".bt.gz"), "formats.bt", carries_tables=True, names_images=True))
+register(
+    Format("MPEG-4 BT", (".bt", ".bt.gz"), "formats.bt", carries_tables=True, names_images=True, carries_streams=True)
+)
 register(
     Format(
         "USD",
@@ -39,8 +41,10 @@ register(
         carries_tables=True,
         names_images=True,
         carries_streams=True,
+        portable=True,
     )
 )
+register(Format("USDZ", (".usdz",), "formats.usd", carries_tables=True, carries_streams=True, portable=True))
 
 __all__ = [
     "Format",

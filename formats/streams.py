@@ -23,8 +23,9 @@ FAP_TEXT = StreamFormat("FAP text", (".fap",))
 FBA_BITSTREAM = StreamFormat("FBA bitstream", (".fba",))
 ARKIT_CURVES = StreamFormat("ARKit curves", (".csv",))
 MOUTH_CUES = StreamFormat("Rhubarb mouth cues", (".json", ".tsv"), writes=False)
+BT_UPDATES = StreamFormat("MPEG-4 BT", (".bt",), writes=False)
 
-STREAM_FORMATS = (FAP_TEXT, FBA_BITSTREAM, ARKIT_CURVES, MOUTH_CUES)
+STREAM_FORMATS = (FAP_TEXT, FBA_BITSTREAM, ARKIT_CURVES, MOUTH_CUES, BT_UPDATES)
 
 
 def stream_format(path: str | Path, *, writing: bool = False) -> StreamFormat:
@@ -75,6 +76,10 @@ def read_stream(
         from formats.fba_bitstream import read_fba
 
         return read_fba(path)
+    if kind is BT_UPDATES:
+        from formats.bt import read_stream as read_bt
+
+        return read_bt(Path(path))
     from formats.fap import read_fap
 
     return read_fap(path)

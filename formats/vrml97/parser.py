@@ -359,9 +359,9 @@ class _Parser:
         if run := _run.match(self.text, self.pos):
             return Numbers(self.convert(run.start(), run.end()))
         word = self.peek_id()
-        if word in ("TRUE", "FALSE"):
+        if word in ("TRUE", "FALSE") or (self.bt and word in ("true", "false")):
             self.pos += len(word)
-            return Booleans((word == "TRUE",))
+            return Booleans((word.upper() == "TRUE",))
         if word == "NULL":
             self.pos += len(word)
             return Nodes((None,))
