@@ -14,7 +14,7 @@ from fba.stream import FapStream
 
 
 def read(path: Path) -> FaceScene | AnimatableFace:
-    """Read a .usda, .usdc or .usd file.
+    """Read a .usda, .usdc, .usd or .usdz file.
 
     Returns
     -------
@@ -34,7 +34,7 @@ def read(path: Path) -> FaceScene | AnimatableFace:
 
 
 def write(face: FaceScene | AnimatableFace, path: Path, stream: FapStream | None = None) -> None:
-    """Write a scene, or a face with its tables as blend shapes; .usd holds the binary form.
+    """Write a scene, or a face with its tables as blend shapes; .usd holds the binary form, .usdz the images too.
 
     stream : played on the face; becomes the animation of the stage.
 
@@ -48,6 +48,25 @@ def write(face: FaceScene | AnimatableFace, path: Path, stream: FapStream | None
     from formats.usd.writer import write_usd
 
     write_usd(face, path, stream)
+
+
+def write_portable(face: FaceScene | AnimatableFace, path: Path, stream: FapStream | None) -> None:
+    """Write a face for programs without inbetweens and negative weights; a plain scene as `write` does.
+
+    The face plays there, alone or with a stream; its tables do not read back.
+
+    Raises
+    ------
+    FaceDefTablesError, OutputFileError
+        As `write` does.
+    """
+    from formats.usd.portable import write_portable_usd
+    from formats.usd.writer import write_usd
+
+    if isinstance(face, AnimatableFace):
+        write_portable_usd(face, path, stream)
+    else:
+        write_usd(face, path, None)
 
 
 def read_shape_set(path: Path) -> ShapeSet | None:

@@ -31,10 +31,10 @@ def write_facts(root: Usd.Prim, face: AnimatableFace, paths: dict[str, Sdf.Path]
     put(root, "notes:keys", Sdf.ValueTypeNames.StringArray, list(face.notes))
     put(root, "notes:values", Sdf.ValueTypeNames.StringArray, list(face.notes.values()))
     stage = root.GetStage()
-    scope = stage.DefinePrim(root.GetPath().AppendChild("FeaturePoints"), "Scope")
+    scope = stage.DefinePrim(root.GetPath().AppendChild("FeaturePoints"))
     put_targets(root, "featurePoints", [scope.GetPath()])
     for key, point in face.feature_points.items():
-        prim = stage.DefinePrim(scope.GetPath().AppendChild(f"fp_{key.replace('.', '_')}"), "Scope")
+        prim = stage.DefinePrim(scope.GetPath().AppendChild(f"fp_{key.replace('.', '_')}"))
         put_string(prim, "id", key)
         put_string(prim, "source", point.source)
         put(prim, "confidence", Sdf.ValueTypeNames.Double, point.confidence)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,11 +14,13 @@ from fba.errors import InputFileError, UnsupportedFeatureError
 from fba.fapu import Fapu
 from fba.scene import FaceScene, Node, Shape, Transform
 from formats.names import unique_names
+from formats.textures import texture_names
 from formats.usd.axes import StageAxes, UsdDocument, read_axes
 from formats.usd.blend_shapes import read_face_def_mesh
 from formats.usd.facts import read_fapu, read_feature_points, read_notes
 from formats.usd.meshes import read_mesh
 from formats.usd.names import CHILDREN, name_of
+from formats.usd.package import resolve
 from formats.usd.properties import PREFIX, get, need, target, targets
 from formats.usd.stages import open_stage, reading
 from formats.usd.writer import FORMAT
@@ -30,8 +33,8 @@ _HELPERS = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 def read_usd(path: Path) -> FaceScene | AnimatableFace:
     """Read a scene or, where the tables are there, an animatable face; see `formats.usd.read`."""
     with reading(path):
-        stage = open_stage(path)
-        scene, axes, _ = read_stage(stage, path)
+        stage, packed = open_stage(path)
+        scene, axes, _ = read_stage(stage, path, packed)
         root = own_root(stage)
         if root is None or target(root, "tables") is None:
             return scene
@@ -58,8 +61,12 @@ def own_root(stage: Usd.Stage) -> Usd.Prim | None:
     return None
 
 
-def read_stage(stage: Usd.Stage, path: Path) -> tuple[FaceScene, StageAxes, dict[str, Usd.Prim]]:
+def read_stage(
+    stage: Usd.Stage, path: Path, packed: Mapping[str, bytes]
+) -> tuple[FaceScene, StageAxes, dict[str, Usd.Prim]]:
     """Read the meshes and transforms of a stage.
+
+    packed : the files of a package; see `formats.usd.stages.open_stage`.
 
     Returns
     -------
@@ -84,10 +91,18 @@ def read_stage(stage: Usd.Stage, path: Path) -> tuple[FaceScene, StageAxes, dict
     scene = FaceScene(tuple(nodes), frame, meters, path.name.split(".")[0], UsdDocument(axes.up_axis))
     if not any(shape.mesh.face_count for shape in scene.shapes):
         raise InputFileError(f"{path} has no mesh; a face needs UsdGeomMesh prims with polygons")
+    scene = replace(scene, images=_images(scene, packed))
     if root is not None:
         return scene, axes, {shape.name: prim for shape, prim in zip(scene.shapes, walk.meshes, strict=True)}
     scene = _with_unique_names(scene)
     return scene, axes, {shape.name: prim for shape, prim in zip(scene.shapes, walk.meshes, strict=True)}
+
+
+def _images(scene: FaceScene, packed: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The images in a package that materials name."""
+    layer = next(iter(packed), "")
+    places = {name: resolve(layer, name) for name in texture_names(scene)}
+    return {name: packed[place] for name, place in places.items() if place in packed}
 
 
 class _Walk:

@@ -42,14 +42,14 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
                     put_string(own.add(token, index, offsets, own.turned(index, offsets)).GetPrim(), "name", name)
             targets.append(own)
         finish(draft, targets)
-    save_layer(draft.layer, path)
+    save_layer(draft.layer, path, scene)
 
 
 def read_shapes(path: Path) -> ShapeSet | None:
     """Read blend shapes as free expressions; see `formats.usd.read_shape_set`."""
     with reading(path):
-        stage = open_stage(path)
-        scene, axes, prims = read_stage(stage, path)
+        stage, packed = open_stage(path)
+        scene, axes, prims = read_stage(stage, path, packed)
         root = own_root(stage)
         listed = (get(root, "shapeNames") if root else None) or ()
         found: dict[str, dict[str, Floats]] = {str(name): {} for name in listed}

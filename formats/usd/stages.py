@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -11,10 +11,12 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdUtils
 
 from fba.errors import InputFileError, OutputFileError
+from fba.scene import FaceScene
 from formats.files import atomic_output, read_bytes
+from formats.usd import package
 from formats.usd.crate import MAGIC, impossible_count
 
-_MAGIC = (b"#usda", b"#sdf", MAGIC, b"PK\x03\x04")
+_MAGIC = (b"#usda", b"#sdf", MAGIC, package.MAGIC)
 
 
 @contextmanager
@@ -40,17 +42,23 @@ def reading(path: Path) -> Iterator[None]:
             raise InputFileError(f"{path} is not a readable USD file: {_first_message(error, path)}") from error
 
 
-def open_stage(path: Path) -> Usd.Stage:
+def open_stage(path: Path) -> tuple[Usd.Stage, Mapping[str, bytes]]:
     """Open a stage with all its payloads. Call it inside `reading`.
+
+    Returns
+    -------
+    stage, and the files of a package by their names, the layer of the stage first; empty for a single file.
 
     Raises
     ------
     InputFileError
-        If the file is missing, empty or not USD, or if a file that it refers to cannot be opened.
+        If the file is missing, empty or not USD, or if a file that it refers to cannot be opened; if a package is
+        damaged or wants something from outside.
     """
     data = read_bytes(path)
     if not data.startswith(_MAGIC):
         raise InputFileError(f"{path} is not a USD file: it starts neither like .usda text nor like .usdc data")
+    packed = package.entries(data, path) if data.startswith(package.MAGIC) else {}
     impossible = impossible_count(data)
     if impossible:
         raise InputFileError(f"{path} is damaged: {impossible}")
@@ -58,6 +66,7 @@ def open_stage(path: Path) -> Usd.Stage:
     if known and not known.dirty:
         # Somebody in this process still holds the file as it was; look whether it has changed since.
         known.Reload()
+    package.check_references(packed, path)
     stage = Usd.Stage.Open(str(path.absolute()))
     problems = stage.GetCompositionErrors()
     if problems:
@@ -65,14 +74,18 @@ def open_stage(path: Path) -> Usd.Stage:
             f"{path} refers to something that cannot be opened: {_one_line(str(problems[0]))} "
             "Put the missing file in its place, or flatten the stage before reading."
         )
-    return stage
+    return stage, packed
 
 
-def save_layer(layer: Sdf.Layer, path: Path) -> None:
-    """Write a layer atomically: .usda as text, .usdc and .usd as data."""
-    kind = "usda" if path.suffix.lower() == ".usda" else "usdc"
+def save_layer(layer: Sdf.Layer, path: Path, scene: FaceScene) -> None:
+    """Write a layer atomically: .usda as text, .usdc and .usd as data, .usdz with the images of the scene."""
+    kind = path.suffix.lower().removeprefix(".")
+    kind = "usdc" if kind == "usd" else kind
     with quiet(), atomic_output(path) as temporary:
         try:
+            if kind == "usdz":
+                temporary.write_bytes(package.package_of(layer, path.stem, scene))
+                return
             done = layer.Export(str(temporary.absolute()), args={"format": kind})
         except Tf.ErrorException as error:
             raise OutputFileError(f"cannot write {path}: {_first_message(error, path)}") from error

@@ -31,7 +31,7 @@ def validate_stage(path: Path) -> list[Finding]:
         If the file cannot be opened at all.
     """
     with reading(path):
-        stage = open_stage(path)
+        stage, _ = open_stage(path)
         findings = _registered(stage)
         for prim in stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
             if prim.IsA(UsdGeom.Mesh):

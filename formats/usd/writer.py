@@ -71,7 +71,7 @@ def write_usd(face: FaceScene | AnimatableFace, path: Path, stream: FapStream | 
             _write_tables(draft, face, None if stream is None else motion_of(face, stream))
         else:
             draft = start(face, "Xform")
-    save_layer(draft.layer, path)
+    save_layer(draft.layer, path, draft.scene)
 
 
 def start(scene: FaceScene, root_type: str, rig: Rig | None = None) -> Draft:
@@ -139,10 +139,10 @@ def _write_tables(draft: Draft, face: AnimatableFace, motion: Motion | None) -> 
     counts = {shape.name: shape.mesh.vertex_count for shape in face.scene.shapes}
     targets = {name: draft.targets(name) for name in counts}
     weights: dict[str, Floats] = {}
-    scope = draft.stage.DefinePrim(draft.root.GetPath().AppendChild("Tables"), "Scope")
+    scope = draft.stage.DefinePrim(draft.root.GetPath().AppendChild("Tables"))
     put_targets(draft.root, "tables", [scope.GetPath()])
     for number, table in enumerate(face.tables):
-        prim = draft.stage.DefinePrim(scope.GetPath().AppendChild(table.name), "Scope")
+        prim = draft.stage.DefinePrim(scope.GetPath().AppendChild(table.name))
         put(prim, "fapID", Sdf.ValueTypeNames.Int, table.fap_id)
         put(prim, "highLevelSelect", Sdf.ValueTypeNames.Int, table.high_level_select)
         blends = []
@@ -159,7 +159,7 @@ def _write_tables(draft: Draft, face: AnimatableFace, motion: Motion | None) -> 
 
 
 def _write_face_def_transform(draft: Draft, path: Sdf.Path, turn: FaceDefTransform) -> None:
-    prim = draft.stage.DefinePrim(path, "Scope")
+    prim = draft.stage.DefinePrim(path)
     x, y, z = draft.axes.vector(turn.rotation_def[:3])
     put_targets(prim, "transform", [draft.paths[turn.transform]])
     put(prim, "fieldId", Sdf.ValueTypeNames.Int, int(turn.field))
