@@ -12,6 +12,8 @@ from fba.errors import MeshError
 
 Json = dict[str, Any]
 
+Rows = NDArray[np.intp]
+
 FLOAT, USHORT, UINT = 5126, 5123, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}

@@ -1,7 +1,7 @@
 """Polygon meshes as what graphics hardware draws: triangles of one material over vertices with one normal and uv.
 
 A vertex is split where texture coordinates or normals differ between the polygons around it, and where materials
-meet.
+meet; below a normal map also where its image is mirrored.
 """
 
 from __future__ import annotations
@@ -11,20 +11,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fba.arrays import Bools, Floats, Floats32, Ints
-from fba.mesh import PolyMesh
 from fba.scene import Shape
-from formats.gltf.buffers import Buffer, Json, to_single
+from formats.gltf.buffers import Buffer, Json, Rows, to_single
 from formats.gltf.materials import Materials
+from formats.gltf.tangents import mirrored, normal_map_set, tangents
 from formats.normals import SmoothNormals
 from formats.targets import Target
 
 VERTEX = "_VERTEX"
 """Attribute that says which vertex of the shape each vertex of a primitive is."""
-
-Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +53,22 @@ def split(shape: Shape, smooth: Floats) -> list[Primitive]:
     if not mesh.face_count:
         return []
     if mesh.face_materials is None:
-        every = np.ones(len(mesh.triangle_faces), dtype=bool)
-        return [_primitive(mesh, every, 0 if shape.materials else -1, smooth)]
-    numbers = mesh.face_materials[mesh.triangle_faces]
-    numbers = np.where(numbers < len(shape.materials), numbers, -1)
-    return [_primitive(mesh, numbers == number, number, smooth) for number in dict.fromkeys(numbers.tolist())]
+        numbers = np.full(len(mesh.triangle_faces), 0 if shape.materials else -1)
+    else:
+        numbers = mesh.face_materials[mesh.triangle_faces]
+        numbers = np.where(numbers < len(shape.materials), numbers, -1)
+    return [_primitive(shape, numbers == number, number, smooth) for number in dict.fromkeys(numbers.tolist())]
 
 
-def _primitive(mesh: PolyMesh, chosen: Bools, material: int, smooth: Floats) -> Primitive:
+def _primitive(shape: Shape, chosen: Bools, material: int, smooth: Floats) -> Primitive:
+    mesh = shape.mesh
     corners = mesh.triangle_corners[chosen].ravel()
     keys = [mesh.indices[corners]]
     for indices in (mesh.texcoord_indices, mesh.normal_indices):
         if indices is not None:
             keys.append(indices[corners])
+    if normal_map_set(shape.materials[material] if material >= 0 else None) == 0:
+        keys.append(mirrored(mesh, corners).astype(np.int32))
     first, order = _distinct(keys)
     corner = corners[first]
     vertices = mesh.indices[corner]
@@ -154,6 +154,10 @@ def _write_primitive(
     }
     texcoords = _texcoords(primitive, extra)
     attributes |= {f"TEXCOORD_{k}": buffer.attribute(to_single(uv)) for k, uv in enumerate(texcoords)}
+    bent = normal_map_set(shape.materials[primitive.material] if primitive.material >= 0 else None)
+    if bent is not None and bent < len(texcoords):
+        turned = tangents(points.astype(np.float64), primitive.normals, texcoords[bent], primitive.triangles)
+        attributes["TANGENT"] = buffer.attribute(to_single(turned))
     colors = _known(extra.get("color"), primitive.vertices, 1.0)
     if colors is not None:
         attributes["COLOR_0"] = buffer.attribute(to_single(np.clip(colors, 0.0, 1.0)))
