@@ -72,15 +72,16 @@ def write_text(text: str, path: Path) -> None:
 def _gunzip(data: bytes, path: Path) -> bytes:
     parts: list[bytes] = []
     size = 0
+    limit = min(MAX_TEXT, max(_SMALL_TEXT, _MOST_PACKED * len(data)))
     while data.startswith(_GZIP):
         reader = zlib.decompressobj(wbits=31)
         try:
-            part = reader.decompress(data, MAX_TEXT - size + 1)
+            part = reader.decompress(data, limit - size + 1)
         except zlib.error as error:
             raise InputFileError(f"{path} is damaged gzip data ({error}); get the file again") from None
         size += len(part)
-        if size > MAX_TEXT:
-            raise InputFileError(f"{path} unpacks to more than {MAX_TEXT >> 20} MiB, which is not read")
+        if size > limit:
+            raise InputFileError(f"{path} unpacks to more than {limit >> 20} MiB, which is not read")
         if not reader.eof:
             raise InputFileError(f"{path} is cut off: the gzip data ends early; get the file again")
         parts.append(part)
