@@ -13,6 +13,9 @@ from formats.files import read_bytes, write_bytes
 MAX_TEXT = 256 << 20
 """Bytes of text that are read at most, after decompression: about 8 million vertices, bounds gzip bombs."""
 
+_SMALL_TEXT, _MOST_PACKED = 16 << 20, 100
+"""Text beyond so many bytes that was packed to less than a hundredth is a trap, no scene; faces pack to a third."""
+
 _GZIP = b"\x1f\x8b"
 
 _GZIP_LEVEL = 5
