@@ -30,6 +30,9 @@ _log = logging.getLogger(__name__)
 _ABSENT = 2**31
 """Stands for the missing number in ``v//vn``; no index can be as large."""
 
+_MOST_OBJECTS = 1000
+"""Each object is cut out of the whole mesh, so that very many take very long."""
+
 _IGNORED = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves", b"surf": "free-form surfaces"}
 
 
@@ -108,10 +111,10 @@ def read(path: Path) -> FaceScene:
     groups, objects, materials, libraries = _statements(lines, rest, remarks)
     known, missing = find_materials(path.parent, libraries)
     remarks.extend(missing)
+    mesh, own = _mesh(vertices, texcoords, normals, polygons, groups, objects, materials, known)
+    shapes = _split(mesh, own, objects, polygons, np.flatnonzero(is_vertex), remarks)
     for remark in remarks:
         _log.info("%s: %s", path, remark)
-    mesh, own = _mesh(vertices, texcoords, normals, polygons, groups, objects, materials, known)
-    shapes = _split(mesh, own, objects, polygons, np.flatnonzero(is_vertex))
     named = tuple(s.name for s in shapes) if len(shapes) > 1 or objects.names else ()
     document = ObjDocument(mesh.indices, mesh.offsets, tuple(remarks), named, colors)
     return FaceScene(shapes, name=path.stem, document=document)
@@ -350,9 +353,13 @@ def _split(
     objects: _Names,
     polygons: _Polygons,
     vertex_lines: NDArray[np.intp],
+    remarks: list[str],
 ) -> tuple[Shape, ...]:
-    """One shape, or one for each object when no two objects share a vertex."""
+    """One shape, or one for each object when no two objects share a vertex and there are not too many."""
     of_face, names = objects.at(polygons.lines, "")
+    if len(names) > _MOST_OBJECTS:
+        remarks.append(f"{len(names)} objects are read as one: more than {_MOST_OBJECTS} are not kept apart")
+        return (Shape("face", mesh, materials=materials),)
     if len(names) < 2:
         return (Shape(names[0] or "face", mesh, materials=materials),)
     corner_object = np.repeat(of_face, mesh.arities)
