@@ -7,7 +7,7 @@ where the two are the same face it is shown as it is.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -97,11 +97,27 @@ class Cell:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What was measured, the pictures, and what went wrong."""
+    """What was measured, the grids, and what went wrong.
+
+    Attributes
+    ----------
+    cells : every motion of every clone.
+    grids : one for each motion: the targets at rest, below them a row for each source, backend and generation.
+    findings : errors for pairs that could not be cloned, warnings for motions that a source lacks.
+    """
 
     cells: tuple[Cell, ...]
-    sheet: Image.Image
+    grids: tuple[Sheet, ...]
     findings: tuple[Finding, ...]
+
+    def image(self) -> Image.Image:
+        """All grids, one below the other."""
+        whole = Sheet(", ".join(grid.title for grid in self.grids))
+        for number, grid in enumerate(self.grids):
+            for row in grid.rows[1 if number else 0 :]:
+                label = f"{grid.title}: {row.label}" if len(self.grids) > 1 and row is not grid.rows[0] else row.label
+                whole.rows.append(replace(row, label=label))
+        return whole.image()
 
     def to_dict(self) -> dict[str, object]:
         """Plain data for JSON: all cells, and the mean over sources, targets and motions for each way."""
@@ -245,7 +261,7 @@ def compare(
     comparer.steps = steps
     for source in sources:
         comparer.add(source)
-    return Comparison(tuple(comparer.cells), comparer.sheet(), tuple(comparer.findings))
+    return Comparison(tuple(comparer.cells), comparer.grids(), tuple(comparer.findings))
 
 
 class _Comparer:
@@ -350,19 +366,19 @@ class _Comparer:
         picture: UInt8 = np.full((round(TALL * self.width), self.width, 3), PAPER, dtype=np.uint8)
         return picture
 
-    def sheet(self) -> Image.Image:
-        """The targets at rest, and below them a grid for each motion."""
-        out = Sheet()
+    def grids(self) -> tuple[Sheet, ...]:
+        """One grid for each motion."""
         neutral = [self._neutral(target) for target in self.targets]
-        out.add_row("target", neutral, [target.name for target in self.targets])
+        out = []
         for k, pick in enumerate(self.picks):
+            grid = Sheet(pick.caption)
+            grid.add_row("target", neutral, [target.name for target in self.targets])
             for number, row in enumerate(self.rows):
-                label = f"{pick.caption}: {row.label}" if len(self.picks) > 1 else row.label
                 pictures = [pictures[k] for pictures in row.pictures]
                 captions = [captions[k] for captions in row.captions]
-                out.add_row(label, pictures, captions, space_before=GAP if number else 3 * GAP)
-        out.title = ", ".join(pick.caption for pick in self.picks)
-        return out.image()
+                grid.add_row(row.label, pictures, captions, space_before=GAP if number else 3 * GAP)
+            out.append(grid)
+        return tuple(out)
 
     def _neutral(self, model: Model) -> UInt8:
         scene = scene_of(model.neutral)

@@ -59,7 +59,7 @@ def compare(
         usage("a face cannot be compared with itself alone; name a second one, or --targets")
     with progress() as tell:
         result = run(rows, columns, picks, ways, generations=generations, cell=cell, progress=tell)
-        save_png(result.sheet, output)
+        save_png(result.image(), output)
     if as_json:
         from studio.cli.console import findings_json
 
