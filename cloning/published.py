@@ -69,18 +69,21 @@ class PublishedTransfer:
         return carried
 
 
-def build_published(source: PreparedFace, target: PreparedFace) -> PublishedTransfer:
-    """Prepare the published method between two faces."""
+def build_published(source: PreparedFace, target: PreparedFace, support: float = SUPPORT) -> PublishedTransfer:
+    """Prepare the published method between two faces.
+
+    support : radius of the filter in the projected plane; 0 takes one sample, without a filter.
+    """
     ids = [i for i in anchor_ids(source.skin, target.skin) if i not in OPTIONAL and i not in EAR_RIMS]
     mine, yours = project(source, ids), project(target, ids)
     plane = align_plane(yours.plane, yours.points, mine.points)
-    matrix, outside = _motion_matrix(mine, source.skin.triangles, plane, yours.lips)
+    matrix, outside = _motion_matrix(mine, source.skin.triangles, plane, yours.lips, support)
     return PublishedTransfer(
         matrix,
         mine.scale,
         yours.scale,
         {"outside_share": outside},
-        {"support": SUPPORT, "mouth_half_angle": MOUTH_HALF_ANGLE, "feature_points": len(ids)},
+        {"support": support, "mouth_half_angle": MOUTH_HALF_ANGLE, "feature_points": len(ids)},
     )
 
 
@@ -128,11 +131,11 @@ def inside_polygon(places: Floats, outline: Floats) -> Bools:
     return inside
 
 
-def _motion_matrix(mine: Projected, triangles: Ints, plane: Floats, lips: Ints) -> tuple[Any, float]:
+def _motion_matrix(mine: Projected, triangles: Ints, plane: Floats, lips: Ints, support: float) -> tuple[Any, float]:
     """(n_t, n_s) matrix of mean sample weights, and the share of samples outside the source's triangles."""
     from scipy.sparse import csr_array
 
-    samples = np.concatenate([plane[:, None], circle_samples(plane)], axis=1)
+    samples = np.concatenate([plane[:, None], circle_samples(plane, support)], axis=1)
     count, n = samples.shape[1], len(mine.plane)
     points, tiles = round_the_back(mine.plane, triangles)
     depth = np.tile(mine.depth, 3)
