@@ -65,8 +65,11 @@ SCENES = ("bt", "glb", "gltf", "mtl", "obj", "off", "ply", "stl", "usda", "wfm",
 def _scene(kind: str) -> Target:
     """A reader of scenes, fed through a file."""
     from benchmarks.fuzz_seeds import OBJ
+    from fba.errors import FapStreamError
     from formats import read
+    from formats.streams import STREAM_FORMATS, read_stream
 
+    with_stream = any(f".{kind}" in f.extensions for f in STREAM_FORMATS)
     folder = Path(tempfile.mkdtemp(prefix="fuzz-"))
     path = folder / f"x.{kind}"
     mesh = folder / "x.obj" if kind == "mtl" else path
@@ -74,7 +77,13 @@ def _scene(kind: str) -> Target:
 
     def target(data: bytes) -> object:
         path.write_bytes(data)
-        return read(mesh)
+        if not with_stream:
+            return read(mesh)
+        try:
+            read_stream(path)
+        except FapStreamError:
+            return read(path)  # Not every scene holds a stream.
+        return read(path)
 
     return target
 

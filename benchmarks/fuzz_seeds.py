@@ -143,15 +143,18 @@ def scene_seeds(kind: str) -> list[bytes]:
     """Good files of one kind of scene: one by hand, and what our own writer makes of a small face."""
     from formats import formats
 
-    known = {e for f in formats() if f.writes for e in f.extensions}
+    known = {e: f for f in formats() if f.writes for e in f.extensions}
+    moving = FapStream.build(25, 3, {3: [0, 90, 0], 49: [0, 20000, -500]}, visemes=[[1, 2, 63, 0], [0] * 4, [0] * 4])
     out = [_BY_HAND[kind]] if kind in _BY_HAND else []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         face = small_face(folder)
         for ending in _WRITTEN.get(kind, ()):
             if ending in known:
-                write(face, folder / f"x{ending}")
-                out.append((folder / f"x{ending}").read_bytes())
+                path = folder / f"x{ending}"
+                for stream in (None, moving) if known[ending].carries_streams else (None,):
+                    write(face, path, stream)
+                    out.append(path.read_bytes())
     return [_with_inline_buffer(data) for data in out] if kind == "gltf" else out
 
 
