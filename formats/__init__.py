@@ -31,6 +31,16 @@ register(
     )
 )
 register(
+    Format(
+        "X3D",
+        (".x3d", ".x3dz", ".x3d.gz"),
+        "formats.x3d",
+        carries_tables=True,
+        names_images=True,
+        carries_streams=True,
+    )
+)
+register(
     Format("MPEG-4 BT", (".bt", ".bt.gz"), "formats.bt", carries_tables=True, names_images=True, carries_streams=True)
 )
 register(

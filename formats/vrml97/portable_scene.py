@@ -11,7 +11,7 @@ from formats.vrml97.tree import Booleans, Statement, Use, VrmlNode, node, number
 
 _LIGHTS = frozenset({"DirectionalLight", "PointLight", "SpotLight"})
 
-_OWN_LIGHTS = (((0.5, -0.6, -0.8), 0.8), ((-0.8, -0.1, -0.6), 0.35))
+_OWN_LIGHTS = (((0.4, -0.5, -0.8), 1.0), ((-0.8, -0.1, -0.6), 0.5))
 """Directions (inside axes) and intensities: one from above on the viewer's left, a weaker one from the right."""
 
 
@@ -45,7 +45,7 @@ def lit(statements: tuple[Statement, ...], frame: Frame) -> tuple[Statement, ...
             "DirectionalLight",
             direction=number(*frame.to_file(np.array(to))),
             intensity=number(power),
-            ambientIntensity=number(0.3),
+            ambientIntensity=number(0.4),
         )
         for to, power in _OWN_LIGHTS
     )

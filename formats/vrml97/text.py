@@ -65,9 +65,9 @@ def read_unpacked(path: Path) -> bytes:
 
 
 def write_text(text: str, path: Path) -> None:
-    """Write UTF-8 text atomically, compressed where the name ends in .gz or .wrz; same text, same bytes."""
+    """Write UTF-8 text atomically, compressed where the name ends in .gz, .wrz or .x3dz; same text, same bytes."""
     data = text.encode("utf-8")
-    if path.name.lower().endswith((".gz", ".wrz")):
+    if path.name.lower().endswith((".gz", ".wrz", ".x3dz")):
         data = gzip.compress(data, compresslevel=_GZIP_LEVEL, mtime=0)
     write_bytes(path, data)
 
