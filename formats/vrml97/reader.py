@@ -181,7 +181,9 @@ def _world(scene: FaceScene) -> dict[str, Floats]:
             matrix = np.eye(4)
             for transform in above:
                 matrix = matrix @ transform.matrix()
-            found[part.name] = part.mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+            with np.errstate(over="ignore", invalid="ignore"):
+                found[part.name] = part.mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    require_near(found.values())
     return found
 
 
