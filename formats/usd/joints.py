@@ -1,8 +1,8 @@
 """The transforms that tables drive, as joints of one skeleton, and which joint every mesh hangs on.
 
-A joint is the first part of a transform (`formats.node_motion`). What lies between two joints, or between a joint and a
-mesh, stays still: where that is more than a shift it becomes a joint of its own above the next one, or part of the
-mesh's bind transform.
+A joint is the first part of a transform (`formats.node_motion`), with its scale only if a table drives that. What lies
+between two joints, or between a joint and a mesh, stays still: where that is more than a shift it becomes a joint of
+its own above the next one, or part of the mesh's bind transform.
 """
 
 from __future__ import annotations
@@ -65,7 +65,8 @@ class Rig:
             for entry in table.transforms:
                 if entry.transform not in known:
                     raise FaceDefTablesError(f"{table.name}: there is no transform '{entry.transform}' in the scene")
-        self._driven = {entry.transform for table in tables for entry in table.transforms}
+        self._driven = {(entry.transform, entry.field) for table in tables for entry in table.transforms}
+        self._moving = {name for name, _ in self._driven}
         self._namer = Namer((ROOT_JOINT,))
         still = np.eye(4)
         self.joints = [Joint(ROOT_JOINT, still, still, None, np.zeros(3))]
@@ -79,7 +80,7 @@ class Rig:
             self.of_shape[node.name] = above
             return
         matrix = between @ node.matrix()
-        if node.name in self._driven:
+        if node.name in self._moving:
             above, matrix = self._add(node, above, between)
         for child in node.children:
             self._visit(child, above, matrix)
@@ -91,13 +92,20 @@ class Rig:
             between = np.eye(4)
         turn, orient = rotation_matrix(node.rotation), np.eye(4)
         orient[:3, :3] = orientation(node)
-        center = np.asarray(node.center, dtype=np.float64)
-        place = translation_matrix(tuple(translation(node, node.translation)))
-        rest = between @ place @ turn @ orient @ np.diag([*node.scale, 1.0])
+        below = orient.T @ translation_matrix((-node.center[0], -node.center[1], -node.center[2]))
+        rest = between @ translation_matrix(tuple(translation(node, node.translation))) @ turn @ orient
+        scale = np.diag([*node.scale, 1.0])
+        if self.scaled(node):
+            rest = rest @ scale
+        else:
+            below = scale @ below
         if np.linalg.matrix_rank(rest[:3, :3]) < 3:
             raise FaceDefTablesError(f"the transform '{node.name}' scales the face to nothing, so it cannot be a joint")
-        number = self._append(node.name, above, rest, node, between[:3, 3])
-        return number, orient.T @ translation_matrix(tuple(-center))
+        return self._append(node.name, above, rest, node, between[:3, 3]), below
+
+    def scaled(self, node: Transform) -> bool:
+        """Does a joint have the scale of its transform? UsdSkel keeps only 11 bits of it: not where it stays still."""
+        return (node.name, TransformField.SCALE) in self._driven
 
     def _append(self, name: str, above: int, rest: Floats, node: Transform | None, shift: Floats) -> int:
         parent = self.joints[above]
@@ -150,7 +158,8 @@ class Rig:
             assert node is not None
             turn = driven.get((node.name, TransformField.ROTATION), quaternion(node, node.rotation)[None])
             move = driven.get((node.name, TransformField.TRANSLATION), translation(node, node.translation)[None])
-            scale = driven.get((node.name, TransformField.SCALE), np.array([node.scale]))
+            rest = np.array([node.scale]) if self.scaled(node) else np.ones((1, 3))
+            scale = driven.get((node.name, TransformField.SCALE), rest)
             turns.append(np.concatenate([axes.vectors(turn[:, :3]), turn[:, 3:]], axis=1))
             moves.append(axes.vectors(move + joint.shift))
             scales.append(axes.scales(scale))
