@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from cloning.image.color import UInt8, is_grey, luminance, to_rgb, to_yuv
+from cloning.image.color import Planes, UInt8, is_grey, luminance, to_rgb, to_yuv
 from cloning.image.eri import ratio_image
 from cloning.image.grid import differences, motion_rows, tent_equations, tents, wanted_differences
 from cloning.image.mask import face_mask, mouth_opening, slit_mask
@@ -25,6 +25,7 @@ from cloning.image.points import (
     turned,
 )
 from cloning.image.solve import PixelSystem
+from cloning.image.texture import without_foreign_texture
 from cloning.image.warp import Sampler, WarpMesh, label_pixels, mapped, ring_around, triangulate
 from fba.arrays import Bools, Floats, Ints
 
@@ -67,15 +68,17 @@ class AnalogyResult:
     steps : of the iteration; 0 where the matrix is factored.
     teeth : True where the source's mouth was shown.
     turned : how much the source's head turned between its pictures: see `cloning.image.points.turned`.
+    foreign : the source's fine texture that was kept off the target, mean of the mask, in levels.
     """
 
     rgb: UInt8
-    luminance: Floats
+    luminance: Planes
     changed: Bools
     points: dict[str, tuple[float, float]]
     steps: int
     teeth: bool
     turned: float
+    foreign: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +91,8 @@ class _Warp:
     mesh: WarpMesh
     moved: Places
     labels: Ints
-    mask: Floats
-    skin: Floats
+    mask: Planes
+    skin: Planes
 
 
 class Analogy:
@@ -101,6 +104,8 @@ class Analogy:
     expressions : points of all expressions to come: they say how far the target's face will reach.
     method : vtc, or eri for expression ratio images.
     teeth : show the source's mouth where it opens and neither neutral face shows teeth.
+    relief : see `RELIEF`.
+    as_published : vtc prints the source's texture on the target as well; see `cloning.image.texture`.
 
     Raises
     ------
@@ -121,17 +126,18 @@ class Analogy:
         method: Method = "vtc",
         teeth: bool = True,
         relief: float = RELIEF,
+        as_published: bool = False,
     ) -> None:
-        self.method, self.teeth = method, teeth
+        self.method, self.teeth, self.as_published = method, teeth, as_published
         self._names = face_points(target.points, source.points, *expressions)
         self._source = {n: source.points[n] for n in self._names}
         self._target = {n: target.points[n] for n in self._names}
         self._fine_target = refined(self._target)
         self._picture = target.rgb
-        self._yuv = to_yuv(target.rgb)
+        self._yuv = to_yuv(target.rgb).astype(np.float32)
         self._grey = is_grey(target.rgb)
         self._unit = eye_separation(target.points)
-        self._height = relief * self._unit / 255.0
+        self._height = np.float32(relief * self._unit / 255.0)
         self._across = source_to_target(self._source, self._target, self._names)
         self._planes = [Sampler(plane, order) for plane, order in zip(self._yuv, (3, 1, 1), strict=True)]
         self._neutral = Sampler(luminance(source.rgb), shrink=1.0 / self._across.scale)
@@ -162,12 +168,17 @@ class Analogy:
         warp = self._warp(expression.points)
         own = {n: expression.points[n] for n in self._names}
         warped, displaced = self._warped_target(warp)
-        pair = self._source_pair(warp, own, expression)
-        steps = 0
+        asked = (warp.mask > 0) | self._near_domain(warp.labels)
+        pair = self._source_pair(warp, asked, own, expression)
+        steps, foreign = 0, 0.0
         if self.method == "eri":
             warped[0] *= 1.0 + warp.skin * warp.mask * (ratio_image(*pair, self._unit) - 1.0)
         else:
-            change, steps = self._transfer(warped[0], *pair, warp.mask)
+            neutral, posed = pair
+            if not self.as_published:
+                posed, left_out = without_foreign_texture(neutral, posed, np.where(asked, warped[0], 0.0), self._unit)
+                foreign = float(np.abs(left_out[warp.mask > 0]).mean())
+            change, steps = self._transfer(warped[0], neutral, posed, warp.mask)
             warped[0] += warp.skin * change
         shown = self.teeth and self._opens(expression.points, warp.moved)
         if shown:
@@ -179,7 +190,7 @@ class Analogy:
         rgb[rows, columns] = np.where(changed[rows, columns, None], to_rgb(warped), rgb[rows, columns])
         light[rows, columns] = warped[0]
         head = turned(self._source, expression.points, self._names)
-        return AnalogyResult(rgb, light, changed, dict(warp.moved), steps, shown, head)
+        return AnalogyResult(rgb, light, changed, dict(warp.moved), steps, shown, head, foreign)
 
     def _moved(self, expression: Places) -> dict[str, tuple[float, float]]:
         return moved_points(self._source, expression, self._target, self._names)
@@ -204,11 +215,11 @@ class Analogy:
         moved = refined(self._moved(expression))
         mesh = triangulate(moved, self._fine_target, self._picture.shape[1::-1])
         labels = label_pixels(mesh, self._box)
-        mask = np.where(self._domain & (labels >= 0), face_mask(moved, self._box), 0.0)
+        mask = np.where(self._domain & (labels >= 0), face_mask(moved, self._box), np.float32(0.0))
         skin = 1.0 - slit_mask(mesh, labels, moved, EYES)
         return _Warp(mesh, moved, labels, mask, skin)
 
-    def _warped_target(self, warp: _Warp) -> tuple[Floats, Bools]:
+    def _warped_target(self, warp: _Warp) -> tuple[Planes, Bools]:
         """Planes of the warped target in the box, and which pixels the warp moved."""
         rows, columns = np.nonzero(warp.labels >= 0)
         goals = np.concatenate([to_array(self._fine_target, warp.mesh.names), warp.mesh.ring])
@@ -223,10 +234,10 @@ class Analogy:
         displaced[rows, columns] = True
         return planes, displaced
 
-    def _source_pair(self, warp: _Warp, own: Places, expression: Picture) -> tuple[Floats, Floats]:
+    def _source_pair(self, warp: _Warp, asked: Bools, own: Places, expression: Picture) -> tuple[Planes, Planes]:
         """Luminance of the source's two pictures at the pixels of the warped target; zero where nothing is asked."""
-        rows, columns = np.nonzero((warp.mask > 0) | self._near_domain(warp.labels))
-        pair = np.zeros((2, *warp.labels.shape))
+        rows, columns = np.nonzero(asked)
+        pair = np.zeros((2, *warp.labels.shape), np.float32)
         shrink = 1.0 / self._expression_scale(own)
         samplers = (self._neutral, Sampler(luminance(expression.rgb), shrink=shrink))
         for plane, points, sampler in zip(pair, (self._source, own), samplers, strict=True):
@@ -252,7 +263,7 @@ class Analogy:
         back = source_to_target(points, self._target, self._names).inverse()
         return np.concatenate([to_array(refined(points), warp.mesh.names), back.apply(warp.mesh.ring)])
 
-    def _transfer(self, warped: Floats, neutral: Floats, expression: Floats, mask: Floats) -> tuple[Floats, int]:
+    def _transfer(self, warped: Planes, neutral: Planes, expression: Planes, mask: Planes) -> tuple[Planes, int]:
         """The change of luminance by which the target's tents follow the source's."""
         inside = self._inside
         warped, neutral, expression = (self._height * plane[inside] for plane in (warped, neutral, expression))
@@ -264,7 +275,7 @@ class Analogy:
         if self._system is None:
             self._system = PixelSystem(self._domain[inside], tent_equations(target)[0])
         found, steps = self._system.solve(wanted - target.ring)
-        change = np.zeros(mask.shape)
+        change = np.zeros(mask.shape, np.float32)
         change[inside] = found / self._height
         return change, steps
 
@@ -273,7 +284,7 @@ class Analogy:
         still = max(mouth_opening(self._source), mouth_opening(self._target))
         return still < SHUT and still + PARTED < min(mouth_opening(expression), mouth_opening(moved))
 
-    def _show_mouth(self, warped: Floats, warp: _Warp, own: Places, expression: Picture) -> Bools:
+    def _show_mouth(self, warped: Planes, warp: _Warp, own: Places, expression: Picture) -> Bools:
         """Put the source's pixels between the lips, and say where."""
         share = slit_mask(warp.mesh, warp.labels, warp.moved, MOUTH) * (warp.labels >= 0)
         rows, columns = np.nonzero(share)
@@ -281,7 +292,7 @@ class Analogy:
         shrink = 1.0 / self._expression_scale(own)
         share_here = share[rows, columns]
         for k, plane in enumerate(to_yuv(expression.rgb)):
-            inside = np.zeros(len(rows)) if k and self._grey else Sampler(plane, 1, shrink).at(places)
+            inside = np.zeros(len(rows), np.float32) if k and self._grey else Sampler(plane, 1, shrink).at(places)
             warped[k, rows, columns] += share_here * (inside - warped[k, rows, columns])
         return share > 0
 

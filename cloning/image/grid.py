@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fba.arrays import Floats
+from cloning.image.color import Planes
 
 SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))
 """Steps (rows, columns) to the ring's pixels."""
@@ -31,26 +31,26 @@ class Tents:
     inverse : (6, ...) of w w^T: xx, yy, zz, xy, xz, yz.
     """
 
-    ring: Floats
-    normal: Floats
-    length: Floats
-    inverse: Floats
+    ring: Planes
+    normal: Planes
+    length: Planes
+    inverse: Planes
 
-    def solve(self, x: Floats | float, y: Floats | float, z: Floats | float) -> Floats:
+    def solve(self, x: Planes | float, y: Planes | float, z: Planes | float) -> Planes:
         """(3, ...) (w w^T)^-1 times a vector."""
         xx, yy, zz, xy, xz, yz = self.inverse
         return np.stack([xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z])
 
 
-def differences(plane: Floats) -> Floats:
+def differences(plane: Planes) -> Planes:
     """(4, h - 2, w - 2) differences from each inner pixel to its neighbours, in the order of `SIDES`."""
     middle = plane[1:-1, 1:-1]
     h, w = plane.shape
     return np.stack([plane[1 + r : h - 1 + r, 1 + c : w - 1 + c] - middle for r, c in SIDES])
 
 
-def tents(plane: Floats) -> Tents:
-    """Build the tents of a height field (h, w), heights in pixels."""
+def tents(plane: Planes) -> Tents:
+    """Build the tents of a height field (h, w), heights in pixels; 4-byte floats are enough and twice as fast."""
     ring = differences(plane)
     right, left, down, up = ring
     nx, ny = (left - right) / 2.0, (up - down) / 2.0
@@ -69,7 +69,7 @@ def tents(plane: Floats) -> Tents:
     return Tents(ring, np.stack([nx, ny, nz]), length, minors)
 
 
-def motion_rows(neutral: Tents, expression: Tents) -> Floats:
+def motion_rows(neutral: Tents, expression: Tents) -> Planes:
     """(3, ...) the luminance row of each source transform Q = w' w^T (w w^T)^-1."""
     tip = expression.length * expression.normal[2] * neutral.length
     right, left, down, up = expression.ring
@@ -78,7 +78,7 @@ def motion_rows(neutral: Tents, expression: Tents) -> Floats:
     return neutral.solve(right - left + tip * nx, down - up + tip * ny, height + tip * nz)
 
 
-def tent_equations(target: Tents) -> tuple[Floats, Floats]:
+def tent_equations(target: Tents) -> tuple[Planes, Planes]:
     """The two equations that are left of each tent of the target.
 
     Returns
@@ -89,10 +89,10 @@ def tent_equations(target: Tents) -> tuple[Floats, Floats]:
     p = target.solve(*target.normal)
     p /= np.sqrt(np.einsum("kij,kij->ij", p, p))
     flat = np.hypot(p[0], p[2])
-    axes = np.zeros((2, *p.shape))
+    axes = np.zeros((2, *p.shape), p.dtype)
     axes[0, 0], axes[0, 2] = p[2] / flat, -p[0] / flat
     axes[1, 0], axes[1, 1], axes[1, 2] = p[1] * axes[0, 2], flat, -p[1] * axes[0, 0]
-    rows = np.empty((2, 4, *p.shape[1:]))
+    rows = np.empty((2, 4, *p.shape[1:]), p.dtype)
     for row, axis in zip(rows, axes, strict=True):
         x, y, z = target.solve(*axis)
         for k, along in enumerate((x, -x, y, -y)):
@@ -100,7 +100,7 @@ def tent_equations(target: Tents) -> tuple[Floats, Floats]:
     return rows, axes
 
 
-def wanted_differences(target: Tents, motion: Floats, near: Floats) -> Floats:
+def wanted_differences(target: Tents, motion: Planes, near: Planes) -> Planes:
     """(4, ...) the differences in each ring that fulfil the tent's two equations, nearest to given ones.
 
     Parameters
@@ -113,5 +113,5 @@ def wanted_differences(target: Tents, motion: Floats, near: Floats) -> Floats:
     aa, bb, ab = (np.einsum("kij,kij->ij", rows[i], rows[j]) for i, j in ((0, 0), (1, 1), (0, 1)))
     det = aa * bb - ab * ab
     first, second = (bb * left[0] - ab * left[1]) / det, (aa * left[1] - ab * left[0]) / det
-    out: Floats = near + first * rows[0] + second * rows[1]
+    out: Planes = near + first * rows[0] + second * rows[1]
     return out

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cloning.image.color import Planes
 from cloning.image.points import Places, Slits, eye_separation, rim_names, to_array
 from cloning.image.warp import WarpMesh
-from fba.arrays import Bools, Floats, Ints
+from fba.arrays import Bools, Ints
 
 INSET = 0.97
 """The mask's outline lies inside the points of the face's contour, by this factor towards its middle: neither the
@@ -24,7 +25,7 @@ RIM_FEATHER = 0.02
 """Softness of the border between lips and mouth, or lids and eye, in eye separations."""
 
 
-def face_mask(moved: Places, box: tuple[slice, slice]) -> Floats:
+def face_mask(moved: Places, box: tuple[slice, slice]) -> Planes:
     """Values 0..1 for the pixels of a box: 0 outside the face's convex hull, 1 well inside."""
     from scipy.spatial import ConvexHull
 
@@ -37,25 +38,28 @@ def face_mask(moved: Places, box: tuple[slice, slice]) -> Floats:
     middle = corners.mean(axis=0)
     corners = middle + INSET * (corners - middle)
     rows, columns = box
-    y = np.arange(rows.start, rows.stop, dtype=np.float64)[:, None]
-    x = np.arange(columns.start, columns.stop, dtype=np.float64)[None, :]
-    depth = np.full((y.size, x.size), np.inf)
+    y, x = (np.arange(part.start, part.stop, dtype=np.float32) for part in (rows, columns))
+    depth = np.full((y.size, x.size), np.inf, np.float32)
+    across = np.empty_like(depth)
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
-        inside = along[0] * (middle[1] - a[1]) - along[1] * (middle[0] - a[0])
-        depth = np.minimum(depth, np.sign(inside) * (along[0] * (y - a[1]) - along[1] * (x - a[0])))
-    return smooth(depth / (FEATHER * eye_separation(moved)))
+        inside = np.sign(along[0] * (middle[1] - a[1]) - along[1] * (middle[0] - a[0]))
+        up, left = np.float32(inside * along[0]), np.float32(inside * along[1])
+        np.subtract((up * (y - np.float32(a[1])))[:, None], (left * (x - np.float32(a[0])))[None, :], out=across)
+        np.minimum(depth, across, out=depth)
+    return smooth(depth / np.float32(FEATHER * eye_separation(moved)))
 
 
-def slit_mask(mesh: WarpMesh, labels: Ints, moved: Places, slits: Slits) -> Floats:
+def slit_mask(mesh: WarpMesh, labels: Ints, moved: Places, slits: Slits) -> Planes:
     """Values 0..1 for the pixels between these upper and lower rims: between lips, between lids."""
     from scipy import ndimage
 
-    inside: Bools = np.zeros(labels.shape, bool)
+    within = np.zeros(len(mesh.triangles) + 1, bool)
     for upper, lower in slits:
-        inside |= np.isin(labels, mesh.of_names({*rim_names(upper, moved), *rim_names(lower, moved)}))
+        within[mesh.of_names({*rim_names(upper, moved), *rim_names(lower, moved)})] = True
+    inside: Bools = within[labels]
     soft = max(RIM_FEATHER * eye_separation(moved), 0.5)
-    blurred: Floats = ndimage.gaussian_filter(inside.astype(np.float64), soft)
+    blurred: Planes = ndimage.gaussian_filter(inside.astype(np.float32), soft)
     return smooth(2.0 * blurred - 0.5)
 
 
@@ -69,8 +73,8 @@ def mouth_opening(places: Places) -> float:
     return max(float(across[0] * gap[1] - across[1] * gap[0]) / width**2, 0.0)
 
 
-def smooth(t: Floats) -> Floats:
+def smooth(t: Planes) -> Planes:
     """The smooth step from 0 to 1, flat beyond."""
     t = np.clip(t, 0.0, 1.0)
-    out: Floats = t * t * (3.0 - 2.0 * t)
+    out: Planes = t * t * (3.0 - 2.0 * t)
     return out

@@ -41,6 +41,12 @@ CONTOURS = (
 BETWEEN = 2
 """Points put on a contour between two neighbours: eight points of a lip become a curve."""
 
+_T = np.arange(1, BETWEEN + 1) / (BETWEEN + 1)
+CATMULL_ROM = 0.5 * np.stack(
+    [-_T + 2 * _T**2 - _T**3, 2 - 5 * _T**2 + 3 * _T**3, _T + 4 * _T**2 - 3 * _T**3, _T**3 - _T**2]
+)
+"""(4, BETWEEN) weights of the four knots around, for each point between the middle two."""
+
 MOVING = ("2", "3", "4", "5", "8", "9")
 """Groups of points that an expression moves; all others (hair line, outline) sit on the skull. Where they seem to
 move the head has turned, and the target's shall not."""
@@ -142,10 +148,10 @@ def refined(places: Places) -> dict[str, tuple[float, float]]:
             continue
         knots = to_array(places, names)
         padded = np.concatenate([2 * knots[:1] - knots[1:2], knots, 2 * knots[-1:] - knots[-2:-1]])
+        curve = sum(np.multiply.outer(weight, padded[j : len(names) - 1 + j]) for j, weight in enumerate(CATMULL_ROM))
         for i, (a, b) in enumerate(pairwise(names)):
-            for k in range(1, BETWEEN + 1):
-                x, y = _catmull_rom(padded[i : i + 4], k / (BETWEEN + 1))
-                out[between(rim, a, b, k)] = (float(x), float(y))
+            for k, (x, y) in enumerate(curve[:, i].tolist(), 1):
+                out[between(rim, a, b, k)] = (x, y)
     return out
 
 
@@ -160,14 +166,6 @@ def rim_names(rim: tuple[str, ...], places: Places) -> list[str]:
     out = names[:1]
     for a, b in pairwise(names):
         out += [*(between(rim, a, b, k) for k in range(1, BETWEEN + 1)), b]
-    return out
-
-
-def _catmull_rom(p: Floats, t: float) -> Floats:
-    out: Floats = 0.5 * (
-        2 * p[1] + (p[2] - p[0]) * t + (2 * p[0] - 5 * p[1] + 4 * p[2] - p[3]) * t**2
-        + (3 * p[1] - p[0] - 3 * p[2] + p[3]) * t**3
-    )  # fmt: skip
     return out
 
 

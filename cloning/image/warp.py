@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cloning.image.color import Planes
 from cloning.image.points import EYES, MOUTH, Places, eye_separation, rim_names, to_array
 from fba.arrays import Floats, Ints
 
@@ -21,6 +22,9 @@ RING_POINTS = 24
 APART = 0.03
 """Rims of lips and lids are held so far apart, in eye separations, while the triangles are chosen: shut lips would
 otherwise be tied to each other by chance."""
+
+EDGE = 1e-9
+"""Pixels; a pixel this near to a triangle's edge belongs to it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,33 +95,50 @@ def triangulate(moved: Places, target: Places, size: tuple[int, int]) -> WarpMes
 
 
 def label_pixels(mesh: WarpMesh, box: tuple[slice, slice]) -> Ints:
-    """Which triangle covers each pixel of a box (rows, columns), -1 for none."""
+    """Which triangle covers each pixel of a box (rows, columns), -1 for none; of several the last."""
     rows, columns = box
     labels = np.full((rows.stop - rows.start, columns.stop - columns.start), -1, np.int32)
-    corner = np.array([columns.start, rows.start], np.float64)
-    for number, three in enumerate(mesh.places[mesh.triangles] - corner):
-        low = np.maximum(np.ceil(three.min(axis=0) - 1e-9).astype(int), 0)
-        high = np.minimum(np.floor(three.max(axis=0) + 1e-9).astype(int) + 1, labels.shape[::-1])
-        if (high <= low).any():
-            continue
-        (ax, ay), (bx, by), (cx, cy) = three
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if abs(area) < 1e-12:
-            continue
-        x = np.arange(low[0], high[0], dtype=np.float64)[None, :]
-        y = np.arange(low[1], high[1], dtype=np.float64)[:, None]
-        second = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / area
-        third = ((y - ay) * (bx - ax) - (x - ax) * (by - ay)) / area
-        inside = (second >= -1e-9) & (third >= -1e-9) & (second + third <= 1.0 + 1e-9)
-        labels[low[1] : high[1], low[0] : high[0]][inside] = number
+    triangles, lines, starts, counts = _spans(mesh.places[mesh.triangles] - [columns.start, rows.start], labels.shape)
+    number = np.repeat(np.arange(len(counts)), counts)
+    along = np.arange(len(number)) - np.repeat(np.cumsum(counts) - counts, counts)
+    labels.ravel()[(lines * labels.shape[1] + starts)[number] + along] = triangles[number]
     return labels
+
+
+def _spans(corners: Floats, shape: tuple[int, ...]) -> tuple[Indices, Indices, Indices, Indices]:
+    """Runs of pixels within triangles (t, 3, 2): triangle, row, first column and length of each, triangles in order."""
+    edges, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    real = np.flatnonzero(np.abs(edges[:, 0] * other[:, 1] - edges[:, 1] * other[:, 0]) >= 1e-12)
+    low = np.maximum(np.ceil(corners[..., 1].min(axis=1) - EDGE).astype(int), 0)
+    high = np.minimum(np.floor(corners[..., 1].max(axis=1) + EDGE).astype(int) + 1, shape[0])
+    tall = np.maximum(high - low, 0)[real]
+    triangles = np.repeat(real, tall)
+    lines = low[triangles] + np.arange(len(triangles)) - np.repeat(np.cumsum(tall) - tall, tall)
+    left, right = np.full(len(lines), np.inf), np.full(len(lines), -np.inf)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        (ax, ay), (bx, by) = corners[triangles, a].T, corners[triangles, b].T
+        steep = np.abs(by - ay) > EDGE
+        share = np.clip((lines - ay) / np.where(steep, by - ay, 1.0), 0.0, 1.0)
+        met = (lines >= np.minimum(ay, by) - EDGE) & (lines <= np.maximum(ay, by) + EDGE)
+        for x in (ax + share * (bx - ax), np.where(steep, ax + share * (bx - ax), bx)):
+            left = np.where(met, np.minimum(left, x), left)
+            right = np.where(met, np.maximum(right, x), right)
+    starts = np.maximum(np.ceil(left - EDGE), 0).astype(int)
+    counts = np.minimum(np.floor(right + EDGE), shape[1] - 1).astype(int) + 1 - starts
+    kept = counts > 0
+    return triangles[kept], lines[kept], starts[kept], counts[kept]
 
 
 def mapped(affine: Floats, labels: Ints, rows: Indices, columns: Indices, box: tuple[slice, slice]) -> Floats:
     """(2, p) places (x, y) in another picture for pixels of a box, all of them in some triangle."""
-    a = affine[labels[rows, columns]]
+    label = labels[rows, columns]
     x, y = (columns + box[1].start).astype(np.float64), (rows + box[0].start).astype(np.float64)
-    return np.stack([a[:, i, 0] * x + a[:, i, 1] * y + a[:, i, 2] for i in (0, 1)])
+    out = np.empty((2, len(label)))
+    for goal, (by_x, by_y, shift) in zip(out, np.ascontiguousarray(np.moveaxis(affine, 0, -1)), strict=True):
+        np.multiply(by_x[label], x, out=goal)
+        goal += by_y[label] * y
+        goal += shift[label]
+    return out
 
 
 class Sampler:
@@ -130,10 +151,10 @@ class Sampler:
     shrink : how many of its pixels will become one; more than 1 blurs it first, so that it does not alias.
     """
 
-    def __init__(self, plane: Floats, order: int = 3, shrink: float = 1.0) -> None:
+    def __init__(self, plane: Planes, order: int = 3, shrink: float = 1.0) -> None:
         from scipy import ndimage
 
-        plane = np.asarray(plane, np.float64)
+        plane = np.asarray(plane, np.float32)
         if shrink > 1.0:
             plane = ndimage.gaussian_filter(plane, 0.5 * np.sqrt(shrink**2 - 1.0), mode="nearest")
         self._order = order
@@ -143,12 +164,13 @@ class Sampler:
             filters: Any = ndimage
             filters.spline_filter(plane, order, output=self._plane, mode="nearest")
 
-    def at(self, places: Floats) -> Floats:
+    def at(self, places: Floats) -> Planes:
         """Values at (2, p) places (x, y); beyond the border its value counts."""
         from scipy import ndimage
 
         filters: Any = ndimage
-        found: Floats = filters.map_coordinates(
-            self._plane, places[::-1], order=self._order, mode="nearest", prefilter=False
+        found = np.empty(places.shape[1], np.float32)
+        filters.map_coordinates(
+            self._plane, places[::-1], output=found, order=self._order, mode="nearest", prefilter=False
         )
         return found

@@ -130,4 +130,6 @@ def test_ratio_images() -> None:
     other = 80.0 + 20.0 * rng.random((50, 60))
     assert correlation(face, other, 3.0).mean() < 0.5
     raw = (other + 4.0) / (face + 4.0)
-    assert np.std(ratio_image(face, other, 50.0)) < 0.5 * np.std(raw)
+    mixed = 0.8 * face + 0.2 * other
+    smoothed = np.std(ratio_image(face, mixed, 50.0)) / np.std((mixed + 4.0) / (face + 4.0))
+    assert smoothed < 0.5 < np.std(ratio_image(face, other, 50.0)) / np.std(raw)
