@@ -45,6 +45,16 @@ register(
 )
 register(
     Format(
+        "MPEG-4 XMT-A",
+        (".xmt", ".xmta", ".xmt.gz", ".xmta.gz"),
+        "formats.xmta",
+        carries_tables=True,
+        names_images=True,
+        carries_streams=True,
+    )
+)
+register(
+    Format(
         "USD",
         (".usda", ".usdc", ".usd"),
         "formats.usd",

@@ -24,8 +24,9 @@ FBA_BITSTREAM = StreamFormat("FBA bitstream", (".fba",))
 ARKIT_CURVES = StreamFormat("ARKit curves", (".csv",))
 MOUTH_CUES = StreamFormat("Rhubarb mouth cues", (".json", ".tsv"), writes=False)
 BT_UPDATES = StreamFormat("MPEG-4 BT", (".bt",), writes=False)
+XMTA_UPDATES = StreamFormat("MPEG-4 XMT-A", (".xmt", ".xmta"), writes=False)
 
-STREAM_FORMATS = (FAP_TEXT, FBA_BITSTREAM, ARKIT_CURVES, MOUTH_CUES, BT_UPDATES)
+STREAM_FORMATS = (FAP_TEXT, FBA_BITSTREAM, ARKIT_CURVES, MOUTH_CUES, BT_UPDATES, XMTA_UPDATES)
 
 
 def stream_format(path: str | Path, *, writing: bool = False) -> StreamFormat:
@@ -80,6 +81,10 @@ def read_stream(
         from formats.bt import read_stream as read_bt
 
         return read_bt(Path(path))
+    if kind is XMTA_UPDATES:
+        from formats.xmta import read_stream as read_xmta
+
+        return read_xmta(Path(path))
     from formats.fap import read_fap
 
     return read_fap(path)

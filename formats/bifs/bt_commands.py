@@ -24,12 +24,7 @@ def write_commands(scene: BifsScene) -> str:
     for frame in scene.frames:
         out.append(f"AT {frame.number * scene.timing.step} {{\n")
         for field, value in frame.changes:
-            if value is None:
-                said = "NULL"
-            elif isinstance(value, VrmlNode):
-                said = " ".join(print_tree((value,), bt=True).split())
-            else:
-                said = str(value)
+            said = " ".join(print_tree((value,), bt=True).split()) if isinstance(value, VrmlNode) else str(value)
             out.append(f" REPLACE {scene.fap_name}.{field} BY {said}\n")
         out.append("}\n")
     return "".join(out)

@@ -6,8 +6,10 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fba.arrays import Ints
 from fba.errors import UnsupportedFeatureError
@@ -29,8 +31,8 @@ HIGH_LEVEL = (("viseme", "Viseme", VISEME_FIELDS), ("expression", "Expression", 
 FLAGS = frozenset({"viseme_def", "init_face", "expression_def"})
 """Fields of these nodes that are SFBool."""
 
-Change = tuple[str, int | VrmlNode | None]
-"""Field of the FAP node and its new value; None is NULL."""
+Change = tuple[str, int | VrmlNode]
+"""Field of the FAP node and its new value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,24 +75,26 @@ def timing_of(stream: FapStream) -> Timing:
     return timing
 
 
-def fap_node(stream: FapStream, frame: int, name: str) -> VrmlNode:
-    """The FAP node of a frame; FAPs that the frame does not speak of are left out, which means "not initialised"."""
+def fap_node(stream: FapStream, name: str) -> VrmlNode:
+    """The FAP node of the first frame; FAPs that it does not speak of are left out, which means "not initialised"."""
     fields: dict[str, Value] = {}
     for k, (field, _, _) in enumerate(HIGH_LEVEL):
-        if stream.mask[frame, k]:
-            fields[field] = Nodes((_high_level(stream, k, frame),))
+        if stream.mask[:, k].any():
+            fields[field] = Nodes((_high_level(k, _rows(stream, k)[0]),))
     for fap in LOW_LEVEL_FAPS:
-        if stream.mask[frame, fap - 1]:
-            fields[fap_field(fap)] = number(int(stream.values[frame, fap - 1]))
+        if stream.mask[0, fap - 1]:
+            fields[fap_field(fap)] = number(int(stream.values[0, fap - 1]))
     return node("FAP", name, **fields)
 
 
 def changes(stream: FapStream) -> Iterator[Frame]:
-    """What every frame but the first changes in the FAP node; frames that change nothing are left out."""
+    """What every frame but the first changes in the FAP node; frames that change nothing are left out.
+
+    A viseme or expression that is not spoken of becomes an empty node, which shows nothing, and not NULL: MP4Box
+    crashes on updates of XMT-A that set NULL. The note tells the difference.
+    """
     low = np.where(stream.mask, stream.values, NOT_INITIALIZED)
-    high = [
-        np.where(stream.mask[:, k : k + 1], rows, -1) for k, rows in enumerate((stream.visemes, stream.expressions))
-    ]
+    high = [_rows(stream, k) for k in range(len(HIGH_LEVEL))]
     differs = low[1:] != low[:-1]
     for k, rows in enumerate(high):
         differs[:, k] = np.any(rows[1:] != rows[:-1], axis=1)
@@ -98,36 +102,42 @@ def changes(stream: FapStream) -> Iterator[Frame]:
         found: list[Change] = []
         for column in np.flatnonzero(differs[frame - 1]).tolist():
             if column < len(HIGH_LEVEL):
-                shown = stream.mask[frame, column]
-                found.append((HIGH_LEVEL[column][0], _high_level(stream, column, frame) if shown else None))
+                found.append((HIGH_LEVEL[column][0], _high_level(column, high[column][frame])))
             else:
                 found.append((fap_field(column + 1), int(low[frame, column])))
         yield Frame(int(stream.frame_numbers[frame]) - int(stream.frame_numbers[0]), tuple(found))
 
 
-def _high_level(stream: FapStream, k: int, frame: int) -> VrmlNode:
+def _rows(stream: FapStream, k: int) -> Ints:
+    """Fields of the visemes or expressions, zero in frames that do not speak of them."""
+    return np.where(stream.mask[:, k : k + 1], (stream.visemes, stream.expressions)[k], 0)
+
+
+def _high_level(k: int, row: Ints) -> VrmlNode:
     _, kind, names = HIGH_LEVEL[k]
-    row = (stream.visemes, stream.expressions)[k][frame].tolist()
     fields: dict[str, Numbers | Booleans] = {
         name: Booleans((True,)) if name in FLAGS else number(value)
-        for name, value in zip(names, row, strict=True)
+        for name, value in zip(names, row.tolist(), strict=True)
         if value
     }
     return node(kind, **fields)
 
 
 def stream_note(stream: FapStream) -> str:
-    """What the updates do not tell: name, version, exact rate, and which frames there are."""
-    row = {
+    """What the updates do not tell: name, version, exact rate, which frames there are, which show no viseme."""
+    row: dict[str, Any] = {
         "name": stream.name,
         "version": stream.version,
         "frame_rate": stream.frame_rate,
         "frames": _runs(stream.frame_numbers),
     }
+    for k, (field, _, _) in enumerate(HIGH_LEVEL):
+        if stream.mask[:, k].any() and not stream.mask[:, k].all():
+            row[f"no_{field}"] = _runs(np.flatnonzero(~stream.mask[:, k]))
     return f"{STREAM_KEY}: {json.dumps(row, separators=(',', ':'), ensure_ascii=False)}"
 
 
-def _runs(numbers: Ints) -> list[list[int]]:
+def _runs(numbers: NDArray[np.integer[Any]]) -> list[list[int]]:
     """Consecutive numbers as [first, count]."""
     starts = np.flatnonzero(np.concatenate([[True], np.diff(numbers) != 1]))
     counts = np.diff(np.append(starts, numbers.size))

@@ -101,6 +101,9 @@ def _sampled(state: _State, updates: Sequence[Update], at: Floats, numbers: Ints
         values[row], mask[row] = np.where(state.mask, state.values, 0), state.mask
         for k, rows in enumerate(high):
             rows[row] = state.high[k] if state.mask[k] else 0
+    for k, rows in enumerate(note.get("absent", ())):
+        mask[rows, k] = False
+        high[k][rows] = 0
     version = note.get("version", "2.1")
     return FapStream(note["frame_rate"], values, mask, high[0], high[1], numbers, note["name"], version)
 
@@ -178,16 +181,26 @@ def _note(strings: tuple[str, ...]) -> dict[str, Any] | None:
         try:
             row = json.loads(body)
             name, version, rate = str(row["name"]), str(row["version"]), float(row["frame_rate"])
-            runs = [(int(a), int(b)) for a, b in row["frames"]]
-            if not 0 < sum(b for _, b in runs) <= MAX_FRAMES or min(b for _, b in runs) < 1:
+            numbers = _unrun(row["frames"])
+            absent = [_unrun(row.get(f"no_{field}", [])) for field, _, _ in HIGH_LEVEL]
+            fits = all(a.size == 0 or 0 <= a[0] <= a[-1] < numbers.size for a in absent)
+            if not (numbers.size and fits and 1e-6 < rate < 1e6):
                 return None
-            numbers = np.concatenate([np.arange(a, a + b, dtype=np.int64) for a, b in runs])
-            if np.any(np.diff(numbers) < 1) or np.abs(numbers).max() >= 2**31 or not 1e-6 < rate < 1e6:
-                return None
-            return {"name": name, "version": version, "frame_rate": rate, "frames": numbers.astype(np.int32)}
+            return {"name": name, "version": version, "frame_rate": rate, "frames": numbers, "absent": absent}
         except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
             return None
     return None
+
+
+def _unrun(runs: Any) -> Ints:
+    """Increasing numbers from [first, count] pairs; ValueError if they are none."""
+    pairs = [(int(a), int(b)) for a, b in runs]
+    if any(b < 1 or not -(2**31) <= a < 2**31 - b for a, b in pairs) or sum(b for _, b in pairs) > MAX_FRAMES:
+        raise ValueError("no runs of numbers")
+    found = np.concatenate([np.arange(a, a + b, dtype=np.int32) for a, b in pairs] or [np.zeros(0, np.int32)])
+    if np.any(found[1:] <= found[:-1]):
+        raise ValueError("not increasing")
+    return found
 
 
 def _rate(seconds: list[float], findings: list[Finding]) -> float:

@@ -61,7 +61,7 @@ def bifs_scene(face: FaceScene | AnimatableFace, stream: FapStream | None) -> Bi
     if not len(stream):
         raise UnsupportedFeatureError(f"the stream '{stream.name}' has no frames")
     name = Names(definitions(built.statements)).give(FAP_NAME)
-    moved = built.face.with_field("fap", Nodes((fap_node(stream, 0, name),)))
+    moved = built.face.with_field("fap", Nodes((fap_node(stream, name),)))
     info = built.metadata.get("info")
     assert isinstance(info, Strings)
     metadata = built.metadata.with_field("info", Strings((*info.values, stream_note(stream)), True))

@@ -1,0 +1,313 @@
+"""From the elements of XMT-A to a scene's syntax tree and the updates that follow."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fba.arrays import Floats
+from fba.errors import InputFileError
+from formats.bifs.playing import Update, plain_value
+from formats.vrml97.numbers import read_decimals
+from formats.vrml97.parser import MAX_DEPTH
+from formats.vrml97.tree import (
+    BodyItem,
+    Booleans,
+    Empty,
+    ExternProto,
+    Field,
+    Interface,
+    Is,
+    Nodes,
+    Numbers,
+    Proto,
+    Route,
+    Statement,
+    Strings,
+    Use,
+    Value,
+    VrmlNode,
+)
+from formats.xml_tree import Element
+from formats.xmta.fields import field_type
+
+_CHUNK = 1 << 21
+"""Characters of numbers that are converted at once: bounds the memory."""
+
+_STRING = re.compile(r"""[\s,]*(["'])((?:[^\\]|\\.)*?)\1(?=\s|\Z)""", re.DOTALL)
+"""A quoted string. Its end is a quotation mark before white space: some writers leave the marks inside unescaped."""
+
+_ESCAPE = re.compile(r"\\(.)", re.DOTALL)
+_NUMBER = re.compile(r"[+-]?(?:0[xX][0-9a-fA-F]+|[0-9.]+(?:[eE][+-]?[0-9]+)?|I)")
+_OWN = frozenset({"DEF", "USE", "binaryID"})
+"""Attributes of nodes that are no fields."""
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """What an XMT-A file says: the scene's statements, and the updates of fields in the file's order."""
+
+    statements: tuple[Statement, ...] = ()
+    updates: list[Update] = field(default_factory=list)
+
+
+def read_document(root: Element, source: str) -> Document:
+    """Read the scene and its updates; commands that insert or delete are passed over.
+
+    Raises
+    ------
+    InputFileError
+        With the line, if the file is no XMT-A, or a value is not what its field takes.
+    """
+    if root.tag != "XMT-A":
+        raise InputFileError(f"{source}: the root is <{root.tag[:40]}>, not <XMT-A>; this is no XMT-A file")
+    return _Reader(source).document(root)
+
+
+class _Reader:
+    def __init__(self, source: str) -> None:
+        self.source = source
+        self.protos: dict[str, Mapping[str, str]] = {}
+
+    def fail(self, element: Element, message: str) -> InputFileError:
+        return InputFileError(f"{self.source}: line {element.line}: {message}")
+
+    # --- commands -------------------------------------------------------------------------------------------
+
+    def document(self, root: Element) -> Document:
+        statements: list[Statement] = []
+        updates: list[Update] = []
+        for body in (b for b in root.children if b.tag == "Body"):
+            for seconds, command in self.commands(body, 0.0, 0):
+                scene = next((c for c in command.children if c.tag == "Scene"), None)
+                if "atNode" in command.attributes:
+                    updates.extend(self.updates(command, seconds))
+                elif scene is not None and not statements:
+                    statements.extend(self.statements(scene, 0))
+        return Document(tuple(statements), updates)
+
+    def commands(self, owner: Element, start: float, depth: int) -> Iterator[tuple[float, Element]]:
+        """Replace elements with their times."""
+        if depth > MAX_DEPTH:
+            raise self.fail(owner, f"<par> is nested deeper than {MAX_DEPTH} levels")
+        for element in owner.children:
+            if element.tag in ("par", "Replace"):
+                begin = element.attributes.get("begin", "")
+                seconds = start + float(self.numbers(begin, element, 1)[0]) if begin.strip() else start
+                if element.tag == "Replace":
+                    yield seconds, element
+                else:
+                    yield from self.commands(element, seconds, depth + 1)
+
+    def updates(self, command: Element, seconds: float) -> Iterator[Update]:
+        parts = [c for c in command.children if c.tag == "repField"] or [command]
+        for part in parts:
+            name, said = part.attributes.get("atField"), part.attributes.get("value")
+            inside = [self.node(c, 0) for c in part.children if c.tag[:1].isupper() and c.tag != "NULL"]
+            if name is None or len(inside) > 1:
+                continue
+            value: float | VrmlNode | None = None
+            if inside:
+                value = plain_value(Nodes(tuple(inside)))
+            elif said is not None and said.strip() != "NULL":
+                guessed = self.value(said, None, part)
+                value = plain_value(guessed)
+                if value is None:
+                    continue
+            yield Update(seconds, command.attributes["atNode"], name, value)
+
+    # --- statements -----------------------------------------------------------------------------------------
+
+    def statements(self, owner: Element, depth: int) -> Iterator[Statement]:
+        for element in owner.children:
+            if element.tag in ("ProtoDeclare", "ExternProtoDeclare"):
+                yield self.proto(element, depth)
+            elif element.tag == "ROUTE":
+                yield self.route(element)
+            elif element.tag[:1].isupper() and element.tag != "IS":
+                yield self.node(element, depth)
+
+    def route(self, element: Element) -> Route:
+        ends = [element.attributes.get(n, "") for n in ("fromNode", "fromField", "toNode", "toField")]
+        if not all(ends):
+            raise self.fail(element, "a ROUTE needs fromNode, fromField, toNode and toField")
+        return Route(ends[0], ends[1], ends[2], ends[3])
+
+    def proto(self, element: Element, depth: int) -> Proto | ExternProto:
+        name = element.attributes.get("name", "")
+        if not name or depth >= MAX_DEPTH:
+            what = f"is nested deeper than {MAX_DEPTH} levels" if name else "has no name"
+            raise self.fail(element, f"<{element.tag}> {what}")
+        interface = tuple(self.interface(c, depth) for c in element.children if c.tag == "field")
+        self.protos[name] = {i.name: i.type for i in interface}
+        if element.tag == "ExternProtoDeclare":
+            urls = self.value(element.attributes.get("locations", ""), "MFString", element)
+            return ExternProto(name, interface, urls if isinstance(urls, Strings) else Strings((), True))
+        inside = Element("", {}, element.line, [c for c in element.children if c.tag != "field"])
+        return Proto(name, interface, tuple(self.statements(inside, depth + 1)))
+
+    def interface(self, element: Element, depth: int) -> Interface:
+        said = element.attributes
+        name, kind, access = (said.get(k, "") for k in ("name", "type", "vrml97Hint"))
+        if not (name and kind and access):
+            raise self.fail(element, "a <field> needs name, type and vrml97Hint")
+        value: Value | None = None
+        if access in ("field", "exposedField"):
+            value = self.declared(element, kind, depth)
+        return Interface(access, kind, name, value)
+
+    def declared(self, element: Element, kind: str | None, depth: int) -> Value | None:
+        """The value of a <field> or <fieldValue>: an attribute, or nodes."""
+        for child in element.children:
+            if child.tag in ("node", "nodes"):
+                return self.nodes(child, child.tag == "nodes", depth)
+        if any(c.tag[:1].isupper() for c in element.children) or (kind or "").endswith("Node"):
+            return self.nodes(element, kind == "MFNode" or len(element.children) > 1, depth)
+        text = element.attributes.get("value")
+        return None if text is None else self.value(text, kind, element)
+
+    # --- nodes ----------------------------------------------------------------------------------------------
+
+    def node(self, element: Element, depth: int) -> VrmlNode | Use:
+        if depth >= MAX_DEPTH:
+            raise self.fail(element, f"nodes are nested deeper than {MAX_DEPTH} levels")
+        said = element.attributes
+        if "USE" in said:
+            return Use(said["USE"])
+        instance = element.tag == "ProtoInstance"
+        kind = said.get("name", "") if instance else element.tag
+        if not kind:
+            raise self.fail(element, "a <ProtoInstance> has no name")
+        body: list[BodyItem] = []
+        for name, text in said.items():
+            if name not in _OWN and not (instance and name in ("name", "protoName")):
+                value = self.value(text, self.type_of(kind, name), element)
+                body.append(Field(name, value))
+        for child in element.children:
+            body.extend(self.part(kind, child, depth))
+        ties = {t.name: t.value for t in body if isinstance(t, Field) and isinstance(t.value, Is)}
+        body = [
+            _tied(p, ties) for p in body if not (isinstance(p, Field) and p.name in ties and _declares(body, p.name))
+        ]
+        return VrmlNode(kind, tuple(body), said.get("DEF"), element.line)
+
+    def type_of(self, kind: str, name: str) -> str | None:
+        return self.protos.get(kind, {}).get(name) or field_type(kind, name)
+
+    def part(self, kind: str, element: Element, depth: int) -> Iterator[BodyItem]:
+        """What an element in a node says: a field of nodes, and the special ones of Scripts and PROTOs."""
+        if element.tag == "IS":
+            for tie in (c.attributes for c in element.children if c.tag == "connect"):
+                if tie.get("nodeField") and tie.get("protoField"):
+                    yield Field(tie["nodeField"], Is(tie["protoField"]))
+        elif element.tag == "field":
+            yield self.interface(element, depth)
+        elif element.tag == "fieldValue":
+            name = element.attributes.get("name", "")
+            value = self.declared(element, self.type_of(kind, name), depth)
+            if name and value is not None:
+                yield Field(name, value)
+        elif element.tag == "ROUTE":
+            yield self.route(element)
+        elif element.tag in ("ProtoDeclare", "ExternProtoDeclare"):
+            yield self.proto(element, depth)
+        elif element.tag[:1].isupper():
+            raise self.fail(element, f"<{element.tag[:40]}> stands in <{kind[:40]}> without the element of a field")
+        else:
+            known = self.type_of(kind, element.tag)
+            many = known == "MFNode" if known else len(element.children) != 1
+            yield Field(element.tag, self.nodes(element, many, depth))
+
+    def nodes(self, owner: Element, many: bool, depth: int) -> Nodes:
+        items: list[VrmlNode | Use | None] = []
+        for element in owner.children:
+            if not element.tag[:1].isupper():
+                raise self.fail(element, f"<{element.tag[:40]}> is no node")
+            items.append(None if element.tag == "NULL" else self.node(element, depth + 1))
+        return Nodes(tuple(items) if items or many else (None,), many)
+
+    # --- values ---------------------------------------------------------------------------------------------
+
+    def value(self, text: str, kind: str | None, element: Element) -> Value:
+        """The value of an attribute; a field of unknown type is taken for what its text looks like."""
+        many = kind is not None and kind.startswith("M")
+        base = _guessed(text) if kind is None else kind[2:]
+        if many and not text.strip():
+            return Empty()
+        if base == "String":
+            if many or (kind is None and text.lstrip()[:1] == '"'):
+                return Strings(_strings(text), True)
+            return Strings((text,))
+        if base == "Bool":
+            words = text.lower().split()
+            if not words or any(w not in ("true", "false", "1", "0") for w in words):
+                raise self.fail(element, f"expected true or false, found {text[:40]!r}")
+            return Booleans(tuple(w in ("true", "1") for w in words), many)
+        if base == "Node":
+            return Nodes((), True) if many else Nodes((None,))
+        values = self.numbers(text, element)
+        return Numbers(values, many or (kind is None and values.size > 4))
+
+    def numbers(self, text: str, element: Element, count: int | None = None) -> Floats:
+        parts: list[Floats] = []
+        at = 0
+        while at < len(text):
+            stop = len(text) if len(text) - at <= _CHUNK else text.rfind(" ", at, at + _CHUNK) + 1
+            if stop <= at:
+                raise self.fail(element, "expected a number, found a very long word")
+            piece = text[at:stop]
+            values = read_decimals(piece)
+            parts.append(np.array([self.number(w, element) for w in _words(piece)]) if values is None else values)
+            at = stop
+        found = np.concatenate(parts) if parts else np.zeros(0)
+        if not found.size or (count is not None and found.size != count):
+            raise self.fail(element, f"expected {'a number' if count else 'numbers'}, found {text[:40]!r}")
+        return found
+
+    def number(self, word: str, element: Element) -> float:
+        try:
+            if not _NUMBER.fullmatch(word):
+                raise ValueError
+            if word.endswith("I"):
+                return float("-inf") if word[0] == "-" else float("inf")
+            return float(int(word, 16)) if "x" in word.lower() else float(word)
+        except (ValueError, OverflowError):
+            raise self.fail(element, f"expected a number, found {word[:40]!r}") from None
+
+
+def _words(text: str) -> list[str]:
+    return text.replace(",", " ").split()
+
+
+def _strings(text: str) -> tuple[str, ...]:
+    """The quoted strings of a list; a text without quotation marks is one string."""
+    if text.lstrip()[:1] not in ("'", '"'):
+        return (text,)
+    found: list[str] = []
+    at = 0
+    while match := _STRING.match(text, at):
+        found.append(_ESCAPE.sub(r"\1", match.group(2)))
+        at = match.end()
+    return tuple(found)
+
+
+def _guessed(text: str) -> str:
+    if text.strip().lower() in ("true", "false"):
+        return "Bool"
+    some = _words(text[:200])[:20]
+    whole = some if len(text) <= 200 else some[:-1]
+    return "Float" if whole and all(_NUMBER.fullmatch(w) for w in whole) else "String"
+
+
+def _declares(body: list[BodyItem], name: str) -> bool:
+    return any(isinstance(p, Interface) and p.name == name for p in body)
+
+
+def _tied(part: BodyItem, ties: Mapping[str, Value]) -> BodyItem:
+    """A Script's declaration with the PROTO field that it takes its value from."""
+    if isinstance(part, Interface) and part.name in ties:
+        return Interface(part.access, part.type, part.name, ties[part.name])
+    return part
