@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from pxr import Gf, Sdf, Tf, Usd, UsdShade
+from pxr import Ar, Gf, Sdf, Tf, Usd, UsdShade
 
 from fba.mesh import Material
 from formats.usd.names import Namer, name_of, put_name
@@ -146,6 +146,13 @@ def _number(prim: Usd.Prim, shader: UsdShade.Shader | None, name: str, own: str,
     return 1.0 - float(single)
 
 
+def _image_name(asset: Sdf.AssetPath) -> str:
+    """The path as the file has it; of an image in a package, that from the package's top."""
+    if Ar.IsPackageRelativePath(asset.resolvedPath):
+        return str(Ar.SplitPackageRelativePathInner(asset.resolvedPath)[1])
+    return str(asset.path)
+
+
 def _texture(prim: Usd.Prim, shader: UsdShade.Shader | None) -> str | None:
     own = get(prim, "texture")
     color = shader.GetInput("diffuseColor") if shader else None
@@ -154,5 +161,5 @@ def _texture(prim: Usd.Prim, shader: UsdShade.Shader | None) -> str | None:
         image = UsdShade.Shader(sources[0].source.GetPrim())
         asset = _input(image, "file")
         if asset is not None:
-            return str(asset.path)  # type: ignore[attr-defined]
+            return _image_name(asset)
     return None if own is None else str(own)

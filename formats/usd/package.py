@@ -24,6 +24,10 @@ _PADDING = 0x1986
 _LAYERS = (".usd", ".usda", ".usdc")
 _IMAGES = {".png": b"\x89PNG", ".jpg": b"\xff\xd8\xff", ".jpeg": b"\xff\xd8\xff"}
 """Images that every program opens; others are turned into PNG."""
+_PASSIVE = (
+    *_IMAGES, ".exr", ".avif", ".hdr", ".tif", ".tiff", ".bmp", ".tga", ".webp", ".gif", ".dds", ".m4a", ".mp3", ".wav"
+)  # fmt: skip
+"""What OpenUSD never opens while it puts a stage together; these may be missing."""
 _MOST_ENTRIES = 10_000
 
 
@@ -93,13 +97,9 @@ def check_references(found: Mapping[str, bytes], path: Path) -> None:
             continue
         sublayers, references, payloads = UsdUtils.ExtractExternalReferences(f"{path.absolute()}[{name}]")
         for wanted in (*sublayers, *references, *payloads):
-            if resolve(name, wanted) not in found and not wanted.lower().endswith(tuple(_IMAGES)):
+            place = posixpath.normpath(posixpath.join(posixpath.dirname(name), wanted))
+            if place not in found and not wanted.lower().endswith(_PASSIVE):
                 raise InputFileError(f"{path}: {name} refers to '{wanted}', which is not in the package")
-
-
-def resolve(layer: str, asset: str) -> str:
-    """The file of a package that an asset path in one of its layers means."""
-    return posixpath.normpath(posixpath.join(posixpath.dirname(layer), asset))
 
 
 def package_of(layer: Sdf.Layer, stem: str, scene: FaceScene) -> bytes:

@@ -20,7 +20,6 @@ from formats.usd.blend_shapes import read_face_def_mesh
 from formats.usd.facts import read_fapu, read_feature_points, read_notes
 from formats.usd.meshes import read_mesh
 from formats.usd.names import CHILDREN, name_of
-from formats.usd.package import resolve
 from formats.usd.properties import PREFIX, get, need, target, targets
 from formats.usd.stages import open_stage, reading
 from formats.usd.writer import FORMAT
@@ -100,9 +99,7 @@ def read_stage(
 
 def _images(scene: FaceScene, packed: Mapping[str, bytes]) -> dict[str, bytes]:
     """The images in a package that materials name."""
-    layer = next(iter(packed), "")
-    places = {name: resolve(layer, name) for name in texture_names(scene)}
-    return {name: packed[place] for name, place in places.items() if place in packed}
+    return {name: packed[name] for name in texture_names(scene) if name in packed}
 
 
 class _Walk:
