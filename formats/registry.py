@@ -8,10 +8,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import Protocol, cast
 
+import numpy as np
+
 from fat.face import AnimatableFace
 from fba.errors import FbaError, LandmarkError, UnknownFormatError, UnsupportedFeatureError
 from fba.scene import FaceScene
 from fba.stream import FapStream
+from formats.extent import require_near
 from formats.textures import place_textures
 
 
@@ -93,13 +96,15 @@ def read(path: str | Path) -> FaceScene | AnimatableFace:
     path = Path(path)
     try:
         found = cast("FaceScene | AnimatableFace", _load(format_of(path), "read")(path))
+        scene = found.scene if isinstance(found, AnimatableFace) else found
+        with np.errstate(over="ignore", invalid="ignore"):
+            require_near([scene.world_neutral()])
     except FbaError as error:
         if path.name not in str(error):
             error.args = (f"{path}: {error}", *error.args[1:])
         raise
-    if isinstance(found, AnimatableFace):
-        return replace(found, scene=replace(found.scene, folder=path.parent))
-    return replace(found, folder=path.parent)
+    scene = replace(scene, folder=path.parent)
+    return replace(found, scene=scene) if isinstance(found, AnimatableFace) else scene
 
 
 def read_scene(path: str | Path) -> FaceScene:

@@ -17,9 +17,9 @@ from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.findings import Finding
 from fba.orientation import orient
 from fba.scene import FaceScene, Role, Shape, Transform
+from formats.extent import require_near
 from formats.vrml97.axes import from_file_axes
 from formats.vrml97.document import VrmlDocument, split
-from formats.extent import require_near
 from formats.vrml97.face_nodes import TableReader, calibration_points, fdp_of, referred_names
 from formats.vrml97.metadata import Metadata, apply_to_shape, read_metadata
 from formats.vrml97.references import definitions_first, unique_definitions
