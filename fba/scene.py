@@ -268,7 +268,11 @@ class FaceScene:
 
     def world_neutral(self) -> Floats:
         """(N, 3) neutral vertices of all shapes in the file's own order, inside axes, world coordinates."""
-        return self.gather({s.name: self.world_vertices(s.name) for s in self.shapes})
+        found: dict[str, Floats] = {}
+        for node, above in self.walk():
+            if isinstance(node, Shape):
+                found[node.name] = _moved(node.mesh.vertices, above)
+        return self.gather(found)
 
     def map_shapes(self, change: dict[str, Shape]) -> FaceScene:
         """Replace shapes by name."""
