@@ -212,18 +212,11 @@ class FaceScene:
 
     def world_matrix(self, name: str) -> Floats:
         """4x4 matrix from a node's local coordinates (for a transform: those of its parent) to the world's."""
-        matrix = np.eye(4)
-        for transform in self.parents(name):
-            matrix = matrix @ transform.matrix()
-        return matrix
+        return _product(self.parents(name))
 
     def world_vertices(self, name: str) -> Floats:
         """(n, 3) vertices of one shape at rest in world coordinates; the mesh's own array if nothing turns it."""
-        vertices = self.shape(name).mesh.vertices
-        matrix = self.world_matrix(name)
-        if np.array_equal(matrix, np.eye(4)):
-            return vertices
-        return vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        return _moved(self.shape(name).mesh.vertices, self.parents(name))
 
     @property
     def vertex_count(self) -> int:
