@@ -144,6 +144,22 @@ def _signed(vectors: Floats, axes: Floats) -> Floats:
     return turned
 
 
+def _product(above: tuple[Transform, ...]) -> Floats:
+    """4x4 matrix of a chain of transforms, outermost first."""
+    matrix = np.eye(4)
+    for transform in above:
+        matrix = matrix @ transform.matrix()
+    return matrix
+
+
+def _moved(vertices: Floats, above: tuple[Transform, ...]) -> Floats:
+    """(n, 3) vertices below a chain of transforms; the same array if nothing turns them."""
+    matrix = _product(above)
+    if np.array_equal(matrix, np.eye(4)):
+        return vertices
+    return vertices @ matrix[:3, :3].T + matrix[:3, 3]
+
+
 @dataclass(frozen=True, eq=False)
 class FaceScene:
     """A scene graph with a face in it.
