@@ -59,17 +59,27 @@ class Backend:
     title : the method in a few words.
     module : import path of the module that offers ``build_transfer(source, target, as_published)``.
     detector : the method's own way to find feature points, for published mode (see `cloning.detect`).
+    recast : import path of the module that offers ``build_recast(source, target)``, where the paper's result is not the
+        target's own mesh; "" = it is.
     """
 
     name: str
     title: str
     module: str
     detector: str = "auto"
+    recast: str = ""
 
     def build(self, source: PreparedFace, target: PreparedFace, as_published: bool) -> SkinTransfer:
         """Prepare the transfer between two faces."""
         builder = cast("Builder", import_module(self.module).build_transfer)
         return builder(source, target, as_published)
+
+    def build_published(self, source: PreparedFace, target: PreparedFace) -> tuple[PreparedFace, SkinTransfer]:
+        """Prepare the paper's own transfer, and the face that it moves: the target, or what the paper makes of it."""
+        if not self.recast:
+            return target, self.build(source, target, True)
+        recast = cast("Callable[..., tuple[PreparedFace, SkinTransfer]]", import_module(self.recast).build_recast)
+        return recast(source, target)
 
 
 _BACKENDS: dict[str, Backend] = {}
@@ -98,9 +108,11 @@ def find_backend(name: str) -> Backend:
     return _BACKENDS[name]
 
 
+RECAST = "cloning.recast"
+
 register_backend(Backend("fit", "elastic template and FAPU-scaled displacements", "cloning.fit"))
 register_backend(Backend("dt", "elastic template and deformation transfer (Xiang et al. 2008)", "cloning.dt", "xiang"))
 register_backend(Backend("fmc", "Facial Motion Cloning (Pandzic 2001)", "cloning.fmc"))
-register_backend(Backend("vtc", "elastic template and vertex tents (Song et al.)", "cloning.vtc"))
-register_backend(Backend("vtc-image", "mesh image and vertex tents (Song et al.)", "cloning.vtc_image"))
+register_backend(Backend("vtc", "elastic template and vertex tents (Song et al.)", "cloning.vtc", recast=RECAST))
+register_backend(Backend("vtc-image", "mesh image and vertex tents (Song et al.)", "cloning.vtc_image", recast=RECAST))
 register_backend(Backend("ec", "Expression Cloning (Noh and Neumann 2001)", "cloning.ec"))

@@ -102,7 +102,8 @@ def clone_with_report(
     onto : the target; its vertices, their order, polygons and materials stay as they are.
     landmarks : feature points of the target; None uses those that `onto` carries, or detects them.
     backend : name of a registered backend.
-    as_published : run the paper's own method instead of the repaired default.
+    as_published : run the paper's own method instead of the repaired default. The result of vertex tents is then the
+        target's shape in the source's topology.
     faps : FAP numbers to clone, 1 (visemes) and 2 (expressions) among them; None = all.
     exact : keep every border, vertex and digit; otherwise the tables are without what nobody sees (`fat.compact`),
         and a third as large. Published mode is always exact.
@@ -127,7 +128,9 @@ def clone_with_report(
         )
     way = find_backend(backend)
     stages = _Stages(progress, {})
-    mine, yours, transfer = _build(source.scene, source.feature_points, onto, landmarks, way.name, as_published, stages)
+    mine, yours, transfer = _build(
+        source.scene, source.feature_points, onto, landmarks, way.name, as_published, stages, recast=as_published
+    )
     wanted = None if faps is None else frozenset(faps)
     motions, turning = _read_source(source, mine.scene, wanted)
     if not motions and not turning:
@@ -166,7 +169,7 @@ def clone_shapes(
     as_published: bool = False,
     progress: Progress | None = None,
 ) -> tuple[ShapeSet, CloneReport]:
-    """Clone free expressions: any named morph targets, as they are.
+    """Clone free expressions: any named morph targets, as they are; they always fit the target's own vertices.
 
     Parameters
     ----------
@@ -201,13 +204,19 @@ def _build(
     backend: str,
     as_published: bool,
     stages: _Stages,
+    recast: bool = False,
 ) -> tuple[PreparedFace, PreparedFace, FaceTransfer]:
+    """Prepare both faces and what carries motion; a recast target is what the paper makes of the one given."""
     mine = stages.run("source", lambda: prepare(source, source_points, "source"))
-    detector = find_backend(backend).detector if as_published else "auto"
+    way = find_backend(backend)
+    detector = way.detector if as_published else "auto"
     scene, points, found = stages.run("landmarks", lambda: target_points(mine, onto, landmarks, detector))
     yours = stages.run("target", lambda: prepare(scene, points, "target"))
     yours = replace(yours, findings=(*found, *yours.findings))
-    skin = stages.run("correspondence", lambda: find_backend(backend).build(mine, yours, as_published))
+    if recast:
+        yours, skin = stages.run("correspondence", lambda: way.build_published(mine, yours))
+    else:
+        skin = stages.run("correspondence", lambda: way.build(mine, yours, as_published))
     transfer = stages.run("parts", lambda: build_face_transfer(mine, yours, skin, as_published))
     return mine, yours, transfer
 

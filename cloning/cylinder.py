@@ -44,6 +44,16 @@ def cylinder(positions: Mapping[str, Floats]) -> Cylinder:
     return Cylinder(x, float(z), float(np.arctan2(tip[0] - x, tip[2] - z)))
 
 
+def head_cylinder(positions: Mapping[str, Floats]) -> Cylinder:
+    """The cylinder about the spine: the axis goes through 7.1, the head's pivot, and 9.3 is at angle zero.
+
+    An axis that lies before the throat would put the throat beside the nape.
+    """
+    pivot, tip = positions["7.1"], positions["9.3"]
+    x, z = float(pivot[0]), float(pivot[2])
+    return Cylinder(x, z, float(np.arctan2(tip[0] - x, tip[2] - z)))
+
+
 def round_the_back(plane: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     """Triangles that cross the seam at +-pi once at its left and once at its right.
 

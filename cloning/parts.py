@@ -73,7 +73,7 @@ def split_parts(scene: FaceScene, points: FeaturePoints) -> tuple[FaceScene, Fea
         where = moved.setdefault(shape.name, {})
         for role in present:
             mesh, ids = shape.mesh.submesh(of_vertex == role.value)
-            name = _free(f"{shape.name}_{role.value}", taken)
+            name = free_name(f"{shape.name}_{role.value}", taken)
             parts.append(Shape(name, mesh, role, shape.materials, order[shape.name][ids]))
             where.update({int(i): (name, k) for k, i in enumerate(ids)})
         change[shape.name] = tuple(parts)
@@ -273,7 +273,8 @@ def _replaced(nodes: tuple[Node, ...], change: Mapping[str, tuple[Shape, ...]]) 
     return tuple(out)
 
 
-def _free(name: str, taken: set[str]) -> str:
+def free_name(name: str, taken: set[str]) -> str:
+    """A name that is not taken, made from this one; it is taken then."""
     number, free = 2, name
     while free in taken:
         free, number = f"{name}_{number}", number + 1

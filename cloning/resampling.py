@@ -3,7 +3,8 @@
 The faces are aligned by their feature points; both are projected to one cylinder; the feature points and the corners
 of the projected source are triangulated, and each source vertex goes to the same coordinates between the target's; the
 target's mesh image there gives its place. Vertices without a place are redundant: they go, and their polygons with
-them.
+them, and what no polygon is left for. So does what the source's own mesh image does not show: mouth lining and eye
+sockets lie behind other skin, and would read the lips' and the cheeks' places. A scanner's faces have none.
 """
 
 from __future__ import annotations
@@ -13,14 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from cloning.align import anchor_ids
-from cloning.cylinder import cylinder
+from cloning.cylinder import head_cylinder
 from cloning.interpolate import TriangleMesh2D
-from cloning.mesh_image import SHEET, MeshImage, draw_mesh
+from cloning.mesh_image import MeshImage, draw_mesh
 from cloning.similarity import Similarity, fit_similarity
 from cloning.surface import Surface
 from fba.arrays import Bools, Floats, Ints
 
 Polygons = tuple[Ints, Ints]
+
+SHOWN = 1e-6
+"""A vertex is shown where its mesh image gives its own place, in eye separations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,27 +57,28 @@ class Resampled:
         return found
 
 
-def resample(source: Surface, target: Surface, outermost: bool = False) -> Resampled:
-    """Give a target the vertices and polygons of a source.
-
-    Parameters
-    ----------
-    outermost : source vertices that are not in the source's own mesh image, behind other skin, are redundant too.
-    """
+def resample(source: Surface, target: Surface) -> Resampled:
+    """Give a target the vertices and polygons of a source."""
     ids = anchor_ids(source, target)
     mine, yours = (np.array([surface.positions[i] for i in ids]) for surface in (source, target))
     alignment = fit_similarity(yours, mine)
-    around = cylinder({i: mine[ids.index(i)] if i in ids else source.positions[i] for i in ("8.3", "8.4", "9.3")})
+    around = head_cylinder(source.positions)
     aligned = alignment.apply(target.vertices)
     plane, depth = around.project(aligned)
     image = draw_mesh(plane, depth, target.triangles, target.vertices)
     own_plane, own_depth = around.project(source.vertices)
     points = [around.project(places)[0] for places in (mine, alignment.apply(yours))]
     vertices, kept = image.sample(parameterised(own_plane, plane, *points))
-    if outermost:
-        seen = draw_mesh(own_plane, own_depth, source.triangles, source.vertices).sample(own_plane)[0]
-        kept &= np.linalg.norm(seen - source.vertices, axis=1) < SHEET
-    return Resampled(vertices, kept, without_redundant(source.polygons, kept), alignment, image)
+    kept &= shown(source, draw_mesh(own_plane, own_depth, source.triangles, source.vertices), own_plane)
+    polygons = without_redundant(source.polygons, kept)
+    kept &= np.bincount(polygons[0], minlength=len(kept)) > 0
+    return Resampled(vertices, kept, polygons, alignment, image)
+
+
+def shown(surface: Surface, image: MeshImage, plane: Floats) -> Bools:
+    """(n,) bool, vertices of a surface that its mesh image shows: no other skin lies outside of them."""
+    found: Bools = np.linalg.norm(image.sample(plane)[0] - surface.vertices, axis=1) < SHOWN
+    return found
 
 
 def parameterised(source: Floats, target: Floats, source_points: Floats, target_points: Floats) -> Floats:

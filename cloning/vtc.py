@@ -20,7 +20,7 @@ from fba.arrays import Floats
 def build_transfer(source: PreparedFace, target: PreparedFace, as_published: bool) -> SkinTransfer:
     """Prepare vertex tents between two faces."""
     if as_published:
-        return build_published(source, target)[0]
+        return build_published(source, target)
     copy, skin_map = template_copy(source, target)
     skin = source.skin
 

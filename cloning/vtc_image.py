@@ -1,14 +1,13 @@
 """Vertex tents by way of the mesh image: the paper's own correspondence.
 
 The target is resampled in the source's topology (see `cloning.resampling`), deforms there tent by tent, and takes the
-target's own vertices along. The default mode keeps only what can be seen of the source, sides of lips and lids apart,
-and feature points and amounts as MPEG-4 wants them. Published mode keeps what has a pixel, counts every tent the same
-and corrects nothing; `transferred` gives its result as the paper has it, with the source's polygons.
+target's own vertices along. The default mode tells sides of lips and lids apart, and has feature points and amounts as
+MPEG-4 wants them. Published mode counts every tent the same and corrects nothing; its result in the paper's form, with
+the source's polygons, is `cloning.recast`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,18 +18,19 @@ from cloning.mesh_image import AROUND
 from cloning.prepare import PreparedFace
 from cloning.resampling import Polygons, Resampled, resample
 from cloning.shape_solver import ShapeTransfer
+from cloning.skin import SkinMap
 from cloning.surface import Surface
 from cloning.template.correspondence import correspond
 from cloning.tents import tent_transfer
-from fba.arrays import Bools, Floats, Ints
+from fba.arrays import Floats, Ints
 
 
 def build_transfer(source: PreparedFace, target: PreparedFace, as_published: bool) -> SkinTransfer:
     """Prepare vertex tents over the mesh image between two faces."""
     if as_published:
-        return build_published(source, target)[0]
+        return build_published(source, target)
     skin = source.skin
-    copy = resample(skin, target.skin, outermost=True)
+    copy = resample(skin, target.skin)
     labels = source.labels.values, target.labels.values
     places = correspond(copy.vertices, copy.triangles, target.skin, labels=labels)
     skin_map = carrying_map(target.skin, places, without=target.labels.between)
@@ -42,12 +42,21 @@ def build_transfer(source: PreparedFace, target: PreparedFace, as_published: boo
     return goal_transfer(source, target, skin_map, factor, _measures(copy))
 
 
-def build_published(source: PreparedFace, target: PreparedFace) -> tuple[BareTransfer, Resampled]:
-    """The paper's transfer, and the target in the source's topology."""
-    skin = source.skin
-    copy = resample(skin, target.skin)
+def build_published(source: PreparedFace, target: PreparedFace) -> BareTransfer:
+    """The paper's transfer, carried back to the target's own vertices."""
+    copy = resample(source.skin, target.skin)
     places = correspond(copy.vertices, copy.triangles, target.skin, farthest=np.inf, least_facing=-1.0)
-    skin_map = carrying_map(target.skin, places)
+    return bare_transfer(source, target, copy, carrying_map(target.skin, places))
+
+
+def bare_transfer(source: PreparedFace, target: PreparedFace, copy: Resampled, skin_map: SkinMap) -> BareTransfer:
+    """The paper's transfer to a resampled target.
+
+    Parameters
+    ----------
+    skin_map : from the vertices of the copy, one for each of the source's, to those of the target.
+    """
+    skin = source.skin
     # Moving the target onto the source is the same as moving the source onto the target.
     turn = copy.alignment.rotation.T / copy.alignment.scale
     vertices = _placed(copy, skin)
@@ -57,36 +66,7 @@ def build_published(source: PreparedFace, target: PreparedFace) -> tuple[BareTra
         return tent_transfer(skin.vertices @ turn.T, vertices, copy.polygons, held, links=skin.links, uniform=True)
 
     measures = {**skin_map.health(), **_measures(copy)}
-    return BareTransfer(source, target, skin_map, factor, measures, {"image_columns": AROUND}, turn), copy
-
-
-@dataclass(frozen=True, eq=False)
-class Transferred:
-    """A published result in the paper's form.
-
-    Attributes
-    ----------
-    neutral : (m, 3) the target resampled, mesh units.
-    posed : (m, K, 3) its expressions.
-    polygons : (indices, offsets) of the source, corrected.
-    kept : (n,) bool, vertices of the source's skin that are left, in order.
-    """
-
-    neutral: Floats
-    posed: Floats
-    polygons: Polygons
-    kept: Bools
-
-
-def transferred(source: PreparedFace, target: PreparedFace, motions: Floats) -> Transferred:
-    """Transfer (n, K, 3) motions of a source's skin, and keep the source's topology, as the paper does."""
-    transfer, copy = build_published(source, target)
-    offsets = transfer.deform(motions)[copy.kept]
-    number = np.cumsum(copy.kept) - 1
-    neutral = copy.vertices[copy.kept]
-    unit = target.fapu.es0
-    polygons = number[copy.polygons[0]].astype(np.int32), copy.polygons[1]
-    return Transferred(neutral * unit, (neutral[:, None] + offsets) * unit, polygons, copy.kept)
+    return BareTransfer(source, target, skin_map, factor, measures, {"image_columns": AROUND}, turn)
 
 
 def _placed(copy: Resampled, skin: Surface) -> Floats:

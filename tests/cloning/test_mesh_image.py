@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,36 @@ def test_the_outermost_sheet_wins_and_sheets_are_not_mixed() -> None:
     assert radius[-1] < 1.1
 
 
+def test_places_are_exact_however_coarse_the_picture() -> None:
+    plane, places, triangles = tube(96, 9)
+    random = np.random.default_rng(2)
+    shares = random.dirichlet(np.ones(3), 300)
+    some = triangles[random.integers(0, len(triangles), 300)]
+    some = some[np.ptp(plane[some][:, :, 0], axis=1) < 1.0]
+    wanted, truth = (np.einsum("mk,mkd->md", shares[: len(some)], values[some]) for values in (plane, places))
+    for columns in (32, 64, AROUND):
+        found, inside = draw_mesh(plane, np.full(len(plane), -1.0), triangles, places, columns).sample(wanted)
+        assert inside.all()
+        assert np.allclose(found, truth, atol=1e-9), "triangles finer than a pixel too"
+
+
+def test_skin_that_faces_inwards_is_not_seen() -> None:
+    plane, places, triangles = tube(96, 9)
+    image = draw_mesh(plane, np.full(len(plane), -1.0), triangles[:, ::-1], places)
+    assert not np.isfinite(image.depth).any()
+    assert not image.sample(plane)[1].any()
+
+
+def test_the_picture_shows_places() -> None:
+    plane, places, triangles = tube(96, 9)
+    image = draw_mesh(plane, np.full(len(plane), -1.0), triangles, places, 128)
+    rows, columns = image.depth.shape
+    u = -np.pi + 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
+    assert image.places.shape == (rows, columns, 3)
+    assert np.abs(np.hypot(*image.places[:, :, [0, 2]].transpose(2, 0, 1)) - 1.0).max() < 1e-3
+    assert np.abs(np.arctan2(image.places[0, :, 0], image.places[0, :, 2]) - u).max() < 1e-2
+
+
 def test_where_nothing_is_nothing_is_found() -> None:
     plane, places, triangles = tube(96, 9)
     open_front = triangles[np.abs(plane[triangles][:, :, 0]).max(axis=1) > 0.4]
@@ -102,13 +134,27 @@ def faces(source: AnimatableFace, wide: tuple[FaceScene, FeaturePoints]) -> tupl
     return prepare(source.scene, source.feature_points, "source"), prepare(*wide, "target")
 
 
-def test_a_face_finds_itself(faces: tuple[PreparedFace, PreparedFace]) -> None:
+def test_a_face_finds_itself_exactly(faces: tuple[PreparedFace, PreparedFace]) -> None:
     skin = faces[0].skin
-    found = resample(skin, skin, outermost=True)
+    found = resample(skin, skin)
     error = np.linalg.norm(found.vertices - skin.vertices, axis=1)[found.kept]
     assert found.kept.mean() > 0.7
-    assert np.median(error) < 0.001
-    assert found.kept[found.polygons[0]].all()
+    assert error.max() < 1e-6
+    assert np.array_equal(np.unique(found.polygons[0]), np.flatnonzero(found.kept)), "every vertex left has a tent"
+
+
+def test_the_throat_is_not_the_nape(faces: tuple[PreparedFace, PreparedFace]) -> None:
+    mine, yours = faces
+    skin = yours.skin
+    # The target's neck ends higher than the source's at the back, so that the source's throat is all there is below.
+    nape = (skin.vertices[:, 2] < skin.positions["7.1"][2]) & (skin.vertices[:, 1] < skin.positions["2.1"][1] + 0.5)
+    short = replace(skin, triangles=skin.triangles[~nape[skin.triangles].any(axis=1)])
+    found = resample(mine.skin, short)
+    behind = mine.skin.vertices[:, 2] < mine.skin.positions["7.1"][2] - 0.1
+    low = mine.skin.vertices[:, 1] < mine.skin.positions["2.1"][1] - 0.2
+    assert (behind & low).sum() > 50
+    places = found.vertices[found.kept & behind & low]
+    assert (places[:, 2] < skin.positions["7.1"][2] + 0.3).all()
 
 
 def in_front(face: PreparedFace) -> Bools:
@@ -119,7 +165,7 @@ def in_front(face: PreparedFace) -> Bools:
 
 def test_another_face_is_found_near_its_true_places(faces: tuple[PreparedFace, PreparedFace]) -> None:
     mine, yours = faces
-    found = resample(mine.skin, yours.skin, outermost=True)
+    found = resample(mine.skin, yours.skin)
     some = found.kept & in_front(mine)
     assert some.sum() > 500
     # The same mesh with other proportions, so that the truth is vertex by vertex.
