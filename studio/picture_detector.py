@@ -9,10 +9,12 @@ from pathlib import Path
 
 from fba.errors import FbaError, LandmarkError
 
-INSTALL = (
-    "python3.11 -m venv DETECTOR && DETECTOR/bin/pip install mediapipe==0.10.21, then --detector DETECTOR/bin/python"
-)
+COMMANDS = "python3.11 -m venv DETECTOR && DETECTOR/bin/pip install mediapipe==0.10.21"
+INSTALL = f"{COMMANDS}, then --detector DETECTOR/bin/python"
 """The last release that carries its models; it needs an older numpy than this toolkit, so it lives apart."""
+
+FBA_DETECTOR = "FBA_DETECTOR"
+"""Environment variable: the python of an environment with MediaPipe."""
 
 MINUTES = 10
 
@@ -30,6 +32,28 @@ FACE_MESH = {
 
 class DetectorError(FbaError):
     """The detector of picture points does not run."""
+
+
+def detector_version(python: str) -> str:
+    """The version of MediaPipe in an environment, without loading it.
+
+    Parameters
+    ----------
+    python : the interpreter of the environment.
+
+    Raises
+    ------
+    DetectorError
+        If it does not start, or has no MediaPipe; the message says what to install.
+    """
+    ask = "from importlib.metadata import version; print(version('mediapipe'))"
+    try:
+        done = subprocess.run([python, "-c", ask], capture_output=True, text=True, timeout=60, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise DetectorError(f"the detector {python} does not run ({error}); set it up with: {INSTALL}") from None
+    if done.returncode != 0:
+        raise DetectorError(f"the environment of {python} has no mediapipe; set it up with: {INSTALL}")
+    return done.stdout.strip()
 
 
 def detect_picture_points(python: str, paths: Sequence[Path]) -> list[dict[str, tuple[float, float]]]:

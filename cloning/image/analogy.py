@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from cloning.image.color import Planes, UInt8, is_grey, luminance, to_rgb, to_yuv
+from cloning.image.color import Planes, UInt8, is_grey, luminance, relit, to_rgb, to_yuv
 from cloning.image.eri import ratio_image
 from cloning.image.grid import differences, motion_rows, tent_equations, tents, wanted_differences
 from cloning.image.mask import face_mask, mouth_opening, slit_mask
@@ -68,7 +68,7 @@ class AnalogyResult:
     steps : of the iteration; 0 where the matrix is factored.
     teeth : True where the source's mouth was shown.
     turned : how much the source's head turned between its pictures: see `cloning.image.points.turned`.
-    foreign : the source's fine texture that was kept off the target, mean of the mask, in levels.
+    relit : how different the light of the source's two pictures is: see `cloning.image.color.relit`.
     """
 
     rgb: UInt8
@@ -78,7 +78,7 @@ class AnalogyResult:
     steps: int
     teeth: bool
     turned: float
-    foreign: float
+    relit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,14 +170,13 @@ class Analogy:
         warped, displaced = self._warped_target(warp)
         asked = (warp.mask > 0) | self._near_domain(warp.labels)
         pair = self._source_pair(warp, asked, own, expression)
-        steps, foreign = 0, 0.0
+        steps, light = 0, relit(*pair, (warp.mask > 0.5) & (warp.skin > 0.99))
         if self.method == "eri":
             warped[0] *= 1.0 + warp.skin * warp.mask * (ratio_image(*pair, self._unit) - 1.0)
         else:
             neutral, posed = pair
             if not self.as_published:
-                posed, left_out = without_foreign_texture(neutral, posed, np.where(asked, warped[0], 0.0), self._unit)
-                foreign = float(np.abs(left_out[warp.mask > 0]).mean())
+                posed = without_foreign_texture(neutral, posed, np.where(asked, warped[0], 0.0), self._unit)
             change, steps = self._transfer(warped[0], neutral, posed, warp.mask)
             warped[0] += warp.skin * change
         shown = self.teeth and self._opens(expression.points, warp.moved)
@@ -186,11 +185,11 @@ class Analogy:
         rows, columns = self._box
         changed = np.zeros(self._picture.shape[:2], bool)
         changed[rows, columns] = displaced | (warp.mask > 0)
-        rgb, light = self._picture.copy(), self._yuv[0].copy()
+        rgb, whole = self._picture.copy(), self._yuv[0].copy()
         rgb[rows, columns] = np.where(changed[rows, columns, None], to_rgb(warped), rgb[rows, columns])
-        light[rows, columns] = warped[0]
+        whole[rows, columns] = warped[0]
         head = turned(self._source, expression.points, self._names)
-        return AnalogyResult(rgb, light, changed, dict(warp.moved), steps, shown, head, foreign)
+        return AnalogyResult(rgb, whole, changed, dict(warp.moved), steps, shown, head, light)
 
     def _moved(self, expression: Places) -> dict[str, tuple[float, float]]:
         return moved_points(self._source, expression, self._target, self._names)

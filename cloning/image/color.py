@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fba.arrays import Bools
+
 UInt8 = NDArray[np.uint8]
 
 Planes = NDArray[np.floating[Any]]
@@ -41,6 +43,16 @@ def to_rgb(yuv: Planes) -> UInt8:
     rgb = np.moveaxis(np.tensordot(RGB_FROM_YUV, yuv, axes=(1, 0)), 0, 2)
     out: UInt8 = np.clip(np.rint(rgb), 0, 255).astype(np.uint8)
     return out
+
+
+def relit(one: Planes, other: Planes, skin: Bools) -> float:
+    """Median ratio of two registered luminances (h, w) over the skin, as a logarithm: 0 in one light.
+
+    An expression changes part of a face, another light or exposure most of it.
+    """
+    if not skin.any():
+        return 0.0
+    return float(np.median(np.abs(np.log(np.maximum(one[skin], 1.0) / np.maximum(other[skin], 1.0)))))
 
 
 def is_grey(rgb: UInt8) -> bool:

@@ -22,7 +22,7 @@ NOISE = 1.0
 """Power of the noise of a picture, in levels squared: below it nothing is texture."""
 
 
-def without_foreign_texture(neutral: Planes, expression: Planes, target: Planes, unit: float) -> tuple[Planes, Planes]:
+def without_foreign_texture(neutral: Planes, expression: Planes, target: Planes, unit: float) -> Planes:
     """The expression without the fine changes that come from texture which the target does not share.
 
     Texture that both have in the same place, like edges of lips and brows, is no reason for doubt: a face given its own
@@ -32,10 +32,6 @@ def without_foreign_texture(neutral: Planes, expression: Planes, target: Planes,
     ----------
     neutral, expression, target : (h, w) registered luminances.
     unit : the eye separation in pixels.
-
-    Returns
-    -------
-    (h, w) the expression's luminance, and (h, w) what was left out of it.
     """
     half = FINE * unit
     change = expression - neutral
@@ -46,8 +42,8 @@ def without_foreign_texture(neutral: Planes, expression: Planes, target: Planes,
     )
     agreed = np.maximum(shared, 0.0) ** 2 / (own_power * other_power)
     believed = np.clip(1.0 - DOUBT * own_power * np.maximum(1.0 - agreed, 0.0) / power, 0.0, 1.0)
-    left_out = (1.0 - believed) * fine
-    return expression - left_out, left_out
+    out: Planes = neutral + coarse + believed * fine
+    return out
 
 
 def _mean(plane: Planes, half: float) -> Planes:

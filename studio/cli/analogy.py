@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
 from studio.cli.arguments import AsJson
 from studio.cli.outcome import usage
+from studio.picture_detector import FBA_DETECTOR
 
 if TYPE_CHECKING:
     from cloning.image import AnalogyResult
@@ -19,8 +20,9 @@ TURNED = 0.08
 """Beyond this much turning of the source's head a warning is given: the shared pairs looked at reach 0.06 from the
 front; one with a head half turned, where cheek and ear come along wrongly, has 0.12."""
 
-DETECTOR = "FBA_DETECTOR"
-"""Environment variable: the python of an environment with MediaPipe."""
+RELIT = 0.1
+"""Beyond this a warning says that the source's pictures differ in light: renderings in one light have 0.01 to 0.02,
+photographs of one sitting 0.05 to 0.07; those with another light or exposure 0.12 and more."""
 
 
 def analogy(
@@ -46,8 +48,13 @@ def analogy(
     ] = None,
     detector: Annotated[
         str | None,
-        typer.Option(envvar=DETECTOR, help="Find missing points: the python of an environment with mediapipe 0.10.21."),
+        typer.Option(
+            envvar=FBA_DETECTOR, help="Find missing points: the python of an environment with mediapipe 0.10.21."
+        ),
     ] = None,
+    as_published: Annotated[
+        bool, typer.Option("--as-published", help="vtc without the guard that keeps the source's beard or pores away.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Put the expression of one photograph on another: the warp of the points, and wrinkles and shades."""
@@ -60,10 +67,11 @@ def analogy(
         return
     _check(inputs, landmarks, output)
     rows = []
-    for path, result, seconds in _transferred(inputs, output, landmarks, method, teeth, detector):
+    for path, result, seconds in _transferred(inputs, output, landmarks, method, teeth, detector, as_published):
         rows.append({
             "file": str(path), "changed_pixels": int(result.changed.sum()), "steps": result.steps,
-            "mouth_from_source": result.teeth, "turned": round(result.turned, 4), "seconds": round(seconds, 3),
+            "mouth_from_source": result.teeth, "turned": round(result.turned, 4), "relit": round(result.relit, 4),
+            "findings": _findings(result), "seconds": round(seconds, 3),
         })  # fmt: skip
     _tell(rows, method, as_json)
 
@@ -77,11 +85,19 @@ def _tell(rows: list[dict[str, object]], method: str, as_json: bool) -> None:
     out = console()
     for row in rows:
         mouth = "; what the lips open shows the source's mouth" if row["mouth_from_source"] else ""
-        if float(str(row["turned"])) > TURNED:
-            out.print(
-                f"warning: {row['file']}: the source's head turned between its pictures; choose pictures from one side"
-            )
+        for finding in cast("list[str]", row["findings"]):
+            out.print(f"warning: {row['file']}: {finding}")
         out.print(f"{row['file']}: {row['changed_pixels']} pixels changed in {row['seconds']} s{mouth}")
+
+
+def _findings(result: AnalogyResult) -> list[str]:
+    """What about the pictures spoils the result."""
+    found = []
+    if result.turned > TURNED:
+        found.append("the source's head turned between its pictures, so cheeks and jaw move; choose two from one side")
+    if result.relit > RELIT:
+        found.append("the source's pictures differ in light or exposure, which shows on the target; choose two alike")
+    return found
 
 
 def _check(inputs: list[Path], landmarks: Path | None, output: Path) -> None:
@@ -104,6 +120,7 @@ def _transferred(
     method: Literal["vtc", "eri"],
     teeth: bool,
     python: str | None,
+    as_published: bool,
 ) -> Iterator[tuple[Path, AnalogyResult, float]]:
     """Write one picture after the other."""
     from cloning.image import Analogy
@@ -114,7 +131,7 @@ def _transferred(
     paths = [source, target, *(pictures_of(expression) if several else [expression])]
     pixels = [read_photo(path) for path in paths]
     one, other, *poses = with_points(paths, pixels, known_points(paths, pixels, landmarks, python))
-    prepared = Analogy(one, other, [p.points for p in poses], method, teeth)
+    prepared = Analogy(one, other, [p.points for p in poses], method, teeth, as_published=as_published)
     if several:
         output.mkdir(exist_ok=True)
     for path, pose in zip(paths[2:], poses, strict=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import shutil
 from dataclasses import asdict, dataclass
@@ -35,6 +36,7 @@ def doctor(as_json: AsJson = False) -> None:
         _source(),
         _egl(),
         _ffmpeg(),
+        detector_check(),
         _program("MP4Box", "checks BT files against a second implementation; part of GPAC"),
         _program("chromium", "checks VRML files in a browser: apt-get install chromium"),
     ]
@@ -81,6 +83,22 @@ def _ffmpeg() -> Check:
     except PackageNotFoundError:
         found = shutil.which("ffmpeg")
         return Check("mp4 output", found is not None, False, found or "pip install 'fba-toolkit[video]'")
+
+
+def detector_check() -> Check:
+    """Whether points of photographs can be found."""
+    from studio.picture_detector import COMMANDS, FBA_DETECTOR, DetectorError, detector_version
+
+    python = os.environ.get(FBA_DETECTOR, "")
+    if not python:
+        detail = (
+            f"finds points in photographs for fba analogy: {COMMANDS}, then export {FBA_DETECTOR}=DETECTOR/bin/python"
+        )
+        return Check("picture points", False, False, detail)
+    try:
+        return Check("picture points", True, False, f"mediapipe {detector_version(python)} in {python}")
+    except DetectorError as error:
+        return Check("picture points", False, False, f"{FBA_DETECTOR}: {error}")
 
 
 def _program(name: str, purpose: str) -> Check:

@@ -24,14 +24,13 @@ def test_a_displaced_beard_is_left_out_and_a_crease_on_smooth_skin_is_kept() -> 
     smooth = np.full((SIZE, SIZE), 120.0) + 0.3 * stubble(1) / 15.0
     bearded = smooth + stubble(2)
     displaced = smooth + np.roll(stubble(2), 3, axis=1)
-    found, left_out = without_foreign_texture(bearded, displaced, smooth, UNIT)
+    found = without_foreign_texture(bearded, displaced, smooth, UNIT)
     assert np.std(found - bearded) < 0.35 * np.std(displaced - bearded)
-    assert found == pytest.approx(displaced - left_out)
-    found, _ = without_foreign_texture(smooth, smooth + crease(), 0.8 * smooth, UNIT)
+    found = without_foreign_texture(smooth, smooth + crease(), 0.8 * smooth, UNIT)
     assert np.abs(found - smooth - crease()).max() < 1.0
 
 
 def test_a_face_keeps_all_of_its_own_texture() -> None:
     bearded = 120.0 + stubble(3)
     displaced = np.roll(bearded, 3, axis=1)
-    assert without_foreign_texture(bearded, displaced, bearded, UNIT)[0] == pytest.approx(displaced, abs=1e-6)
+    assert without_foreign_texture(bearded, displaced, bearded, UNIT) == pytest.approx(displaced, abs=1e-6)

@@ -14,6 +14,7 @@ from typer.testing import CliRunner, Result
 
 from formats.picture_points import read_picture_points, write_picture_points
 from studio.cli.app import app
+from studio.cli.doctor import detector_check
 from studio.cli.outcome import Outcome
 from studio.picture_points import template_points
 
@@ -146,3 +147,38 @@ def test_a_detector_answers_with_places_of_the_face_mesh(folder: Path) -> None:
     assert found["8.3"] == pytest.approx((3.0 + 0.2 * 291, 4.0 + 0.25 * 291), abs=0.01)
     script.write_text(f"#!{sys.executable}\nimport json, sys\nprint(json.dumps([[]] * (len(sys.argv) - 2)))\n")
     assert "finds no face" in fba("analogy", *words(folder, "--template", write, "--detector", script)).stderr
+
+
+def test_pictures_that_do_not_go_together_are_found(folder: Path) -> None:
+    listed = ("--landmarks", folder / "points.json", "--json")
+    (alike,) = json.loads(fba("analogy", *words(folder, "-o", folder / "out.png", *listed)).stdout)["pictures"]
+    assert alike["findings"] == []
+    Image.fromarray(picture(wrinkle(pixels(1.5)), SMILE).rgb).save(folder / "e.png")
+    document = json.loads((folder / "points.json").read_text())
+    document["pictures"]["e.png"]["points"]["3.7"][0] -= 12.0
+    (folder / "points.json").write_text(json.dumps(document))
+    (row,) = json.loads(fba("analogy", *words(folder, "-o", folder / "out.png", *listed)).stdout)["pictures"]
+    turned, relit = row["findings"]
+    assert "turned" in turned
+    assert "light" in relit
+    said = fba("analogy", *words(folder, "-o", folder / "out.png", *listed[:2])).stdout
+    assert said.count("warning:") == 2
+
+
+def test_the_paper_knows_no_guard_against_texture(folder: Path) -> None:
+    listed = ("--landmarks", folder / "points.json")
+    for name, more in (("guarded", ()), ("published", ("--as-published",))):
+        result = fba("analogy", *words(folder, "-o", folder / f"{name}.png", *listed, *more))
+        assert result.exit_code == Outcome.OK, result.output
+    assert (pixels_of(folder / "guarded.png") != pixels_of(folder / "published.png")).any()
+
+
+@pytest.mark.parametrize("detector", ["", "nowhere", "there"])
+def test_the_doctor_knows_the_detector(folder: Path, monkeypatch: pytest.MonkeyPatch, detector: str) -> None:
+    (folder / "there").write_text("#!/bin/sh\necho 0.10.21\n")
+    (folder / "there").chmod(0o755)
+    monkeypatch.setenv("FBA_DETECTOR", str(folder / detector) if detector else "")
+    found = detector_check()
+    assert found.ok == (detector == "there")
+    assert ("0.10.21" if found.ok else "pip install mediapipe==0.10.21") in found.detail
+    assert not found.needed
