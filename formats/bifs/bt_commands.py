@@ -10,7 +10,6 @@ from formats.bifs.changes import TICKS
 from formats.bifs.playing import Update, plain_value
 from formats.bifs.scene import BifsScene
 from formats.vrml97.parser import parse
-from formats.vrml97.printer import print_tree
 from formats.vrml97.tree import Nodes, Raw, Statement, VrmlNode
 
 _TOKEN = re.compile(r'#[^\n]*+|"[^"\\]*+(?:\\.[^"\\]*+)*+"|[{}\[\]]|[^\s,{}\[\]"#]++', re.DOTALL)
@@ -23,9 +22,9 @@ def write_commands(scene: BifsScene) -> str:
     out: list[str] = []
     for frame in scene.frames:
         out.append(f"AT {frame.number * scene.timing.step} {{\n")
-        for field, value in frame.changes:
-            said = " ".join(print_tree((value,), bt=True).split()) if isinstance(value, VrmlNode) else str(value)
-            out.append(f" REPLACE {scene.fap_name}.{field} BY {said}\n")
+        for change in frame.changes:
+            said = str(change.value).upper()
+            out.append(f" REPLACE {change.node}.{change.field} BY {said}\n")
         out.append("}\n")
     return "".join(out)
 

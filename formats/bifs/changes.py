@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -16,7 +16,7 @@ from fba.errors import UnsupportedFeatureError
 from fba.faps import LOW_LEVEL_FAPS
 from fba.stream import EXPRESSION_FIELDS, VISEME_FIELDS, FapStream
 from formats.vrml97.face_nodes import fap_field
-from formats.vrml97.tree import Booleans, Nodes, Numbers, Value, VrmlNode, node, number
+from formats.vrml97.tree import Booleans, Nodes, Value, VrmlNode, node, number
 from formats.vrml97.writer import NOT_INITIALIZED
 
 TICKS = 1000
@@ -31,8 +31,17 @@ HIGH_LEVEL = (("viseme", "Viseme", VISEME_FIELDS), ("expression", "Expression", 
 FLAGS = frozenset({"viseme_def", "init_face", "expression_def"})
 """Fields of these nodes that are SFBool."""
 
-Change = tuple[str, int | VrmlNode]
-"""Field of the FAP node and its new value."""
+FAP_NAMES = ("FAPS", "VISEME", "EXPRESSION")
+"""DEF names of the FAP node that a stream changes and the two nodes in it, unless the scene has them already."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A new value of a field. node : DEF name of its node."""
+
+    node: str
+    field: str
+    value: int | bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,52 +84,47 @@ def timing_of(stream: FapStream) -> Timing:
     return timing
 
 
-def fap_node(stream: FapStream, name: str) -> VrmlNode:
-    """The FAP node of the first frame; FAPs that it does not speak of are left out, which means "not initialised"."""
+def fap_node(stream: FapStream, names: Sequence[str]) -> VrmlNode:
+    """The FAP node of the first frame; FAPs that it does not speak of are left out, which means "not initialised".
+
+    names : DEF names as in FAP_NAMES.
+    """
     fields: dict[str, Value] = {}
-    for k, (field, _, _) in enumerate(HIGH_LEVEL):
+    for k, (field, kind, inside) in enumerate(HIGH_LEVEL):
         if stream.mask[:, k].any():
-            fields[field] = Nodes((_high_level(k, _rows(stream, k)[0]),))
+            row = zip(inside, _rows(stream, k)[0].tolist(), strict=True)
+            said = {name: Booleans((True,)) if name in FLAGS else number(value) for name, value in row if value}
+            fields[field] = Nodes((node(kind, names[k + 1], **said),))
     for fap in LOW_LEVEL_FAPS:
         if stream.mask[0, fap - 1]:
             fields[fap_field(fap)] = number(int(stream.values[0, fap - 1]))
-    return node("FAP", name, **fields)
+    return node("FAP", names[0], **fields)
 
 
-def changes(stream: FapStream) -> Iterator[Frame]:
-    """What every frame but the first changes in the FAP node; frames that change nothing are left out.
+def changes(stream: FapStream, names: Sequence[str]) -> Iterator[Frame]:
+    """What every frame but the first changes; frames that change nothing are left out.
 
-    A viseme or expression that is not spoken of becomes an empty node, which shows nothing, and not NULL: MP4Box
-    crashes on updates of XMT-A that set NULL. The note tells the difference.
+    A viseme or expression that is not spoken of has zeros in all fields, which shows nothing. It does not become NULL
+    or an empty node: MP4Box crashes on updates of XMT-A that set NULL, and cannot decode an update that ends in an
+    empty node. The note tells the difference.
     """
-    low = np.where(stream.mask, stream.values, NOT_INITIALIZED)
-    high = [_rows(stream, k) for k in range(len(HIGH_LEVEL))]
-    differs = low[1:] != low[:-1]
-    for k, rows in enumerate(high):
-        differs[:, k] = np.any(rows[1:] != rows[:-1], axis=1)
+    low = np.where(stream.mask, stream.values, NOT_INITIALIZED)[:, 2:]
+    columns = [(names[k + 1], name) for k, (_, _, inside) in enumerate(HIGH_LEVEL) for name in inside]
+    columns += [(names[0], fap_field(fap)) for fap in LOW_LEVEL_FAPS]
+    table = np.concatenate([_rows(stream, 0), _rows(stream, 1), low], axis=1)
+    differs = table[1:] != table[:-1]
     for frame in (np.flatnonzero(differs.any(axis=1)) + 1).tolist():
         found: list[Change] = []
         for column in np.flatnonzero(differs[frame - 1]).tolist():
-            if column < len(HIGH_LEVEL):
-                found.append((HIGH_LEVEL[column][0], _high_level(column, high[column][frame])))
-            else:
-                found.append((fap_field(column + 1), int(low[frame, column])))
+            owner, field = columns[column]
+            value = int(table[frame, column])
+            found.append(Change(owner, field, bool(value) if field in FLAGS else value))
         yield Frame(int(stream.frame_numbers[frame]) - int(stream.frame_numbers[0]), tuple(found))
 
 
 def _rows(stream: FapStream, k: int) -> Ints:
     """Fields of the visemes or expressions, zero in frames that do not speak of them."""
     return np.where(stream.mask[:, k : k + 1], (stream.visemes, stream.expressions)[k], 0)
-
-
-def _high_level(k: int, row: Ints) -> VrmlNode:
-    _, kind, names = HIGH_LEVEL[k]
-    fields: dict[str, Numbers | Booleans] = {
-        name: Booleans((True,)) if name in FLAGS else number(value)
-        for name, value in zip(names, row.tolist(), strict=True)
-        if value
-    }
-    return node(kind, **fields)
 
 
 def stream_note(stream: FapStream) -> str:

@@ -8,7 +8,7 @@ from fat.face import AnimatableFace
 from fba.errors import UnsupportedFeatureError
 from fba.scene import FaceScene
 from fba.stream import FapStream
-from formats.bifs.changes import Frame, Timing, changes, fap_node, stream_note, timing_of
+from formats.bifs.changes import FAP_NAMES, Frame, Timing, changes, fap_node, stream_note, timing_of
 from formats.vrml97.names import Names
 from formats.vrml97.references import definitions_first
 from formats.vrml97.tree import (
@@ -26,9 +26,6 @@ from formats.vrml97.tree import (
 )
 from formats.vrml97.writer import Written, pieces
 
-FAP_NAME = "FAPS"
-"""DEF name of the FAP node that a stream changes, unless the scene has the name already."""
-
 
 @dataclass(frozen=True, eq=False)
 class BifsScene:
@@ -38,13 +35,11 @@ class BifsScene:
     ----------
     statements : PROTOs, one top Group with the Face, ROUTEs.
     frames : what the frames after the first one change in the FAP node.
-    fap_name : DEF name of the FAP node.
     """
 
     statements: tuple[Statement, ...]
     timing: Timing = field(default_factory=Timing)
     frames: tuple[Frame, ...] = ()
-    fap_name: str = FAP_NAME
 
 
 def bifs_scene(face: FaceScene | AnimatableFace, stream: FapStream | None) -> BifsScene:
@@ -60,12 +55,13 @@ def bifs_scene(face: FaceScene | AnimatableFace, stream: FapStream | None) -> Bi
         return BifsScene(_statements(built, built.face, built.metadata))
     if not len(stream):
         raise UnsupportedFeatureError(f"the stream '{stream.name}' has no frames")
-    name = Names(definitions(built.statements)).give(FAP_NAME)
-    moved = built.face.with_field("fap", Nodes((fap_node(stream, name),)))
+    free = Names(definitions(built.statements))
+    names = [free.give(name) for name in FAP_NAMES]
+    moved = built.face.with_field("fap", Nodes((fap_node(stream, names),)))
     info = built.metadata.get("info")
     assert isinstance(info, Strings)
     metadata = built.metadata.with_field("info", Strings((*info.values, stream_note(stream)), True))
-    return BifsScene(_statements(built, moved, metadata), timing_of(stream), tuple(changes(stream)), name)
+    return BifsScene(_statements(built, moved, metadata), timing_of(stream), tuple(changes(stream, names)))
 
 
 def _statements(built: Written, face: VrmlNode | None, metadata: VrmlNode) -> tuple[Statement, ...]:

@@ -76,12 +76,9 @@ def print_scene(scene: BifsScene) -> str:
     for frame in scene.frames:
         seconds = round(frame.number * scene.timing.step / scene.timing.resolution, 6)
         out.append(f'  <par begin="{seconds!r}">\n')
-        for field, value in frame.changes:
-            start = f"   <Replace{attribute('atNode', scene.fap_name)}{attribute('atField', field)}"
-            if isinstance(value, VrmlNode):
-                out.extend([f"{start}>\n", *printer.node(value, 4), "   </Replace>\n"])
-            else:
-                out.append(f'{start} value="{value}"/>\n')
+        for change in frame.changes:
+            said = (("atNode", change.node), ("atField", change.field), ("value", str(change.value).lower()))
+            out.append(f"   <Replace{''.join(attribute(*pair) for pair in said)}/>\n")
         out.append("  </par>\n")
     out.append(" </Body>\n</XMT-A>\n")
     return "".join(out)

@@ -56,13 +56,15 @@ def test_the_updates_are_plain_bifs(tmp_path: Path) -> None:
         25, 4, {3: [0, 100, 100, -20], 6: [1, 1, 1, 2]}, visemes=[[0] * 4, [1, 0, 63, 1], [1, 0, 63, 1], [0] * 4]
     )
     text = bt.to_text(small_face(), stream)
-    assert re.search(r"fap DEF FAPS FAP \{\s+viseme Viseme \{ \}\s+open_jaw 0\s+stretch_l_corner 1\s+\}", text)
+    assert re.search(
+        r"fap DEF FAPS FAP \{\s+viseme DEF VISEME Viseme \{ \}\s+open_jaw 0\s+stretch_l_corner 1\s+\}", text
+    )
     assert re.search(r"fit FIT \{ \}", text)
     assert text[text.index("AT ") :] == (
-        "AT 40 {\n REPLACE FAPS.viseme BY Viseme { viseme_select1 1 viseme_blend 63 viseme_def TRUE }\n"
-        " REPLACE FAPS.open_jaw BY 100\n}\n"
-        "AT 120 {\n REPLACE FAPS.viseme BY Viseme { }\n REPLACE FAPS.open_jaw BY -20\n"
-        " REPLACE FAPS.stretch_l_corner BY 2\n}\n"
+        "AT 40 {\n REPLACE VISEME.viseme_select1 BY 1\n REPLACE VISEME.viseme_blend BY 63\n"
+        " REPLACE VISEME.viseme_def BY TRUE\n REPLACE FAPS.open_jaw BY 100\n}\n"
+        "AT 120 {\n REPLACE VISEME.viseme_select1 BY 0\n REPLACE VISEME.viseme_blend BY 0\n"
+        " REPLACE VISEME.viseme_def BY FALSE\n REPLACE FAPS.open_jaw BY -20\n REPLACE FAPS.stretch_l_corner BY 2\n}\n"
     )
     assert "timeStampResolution" not in text
     assert "timeStampResolution 30\n" in bt.to_text(small_face(), patchy_stream(30))

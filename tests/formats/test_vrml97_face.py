@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -425,14 +423,6 @@ def test_bt_holds_the_scene_in_the_face_and_no_protos() -> None:
     assert [n.def_name for n in fdp.nodes("faceSceneGraph") if isinstance(n, VrmlNode)] == ["head"]
     uses = {n.name for n in walk([face]) if isinstance(n, Use)}
     assert {"skin", "teeth", "eye_left_yaw"} <= uses
-
-
-@pytest.mark.skipif(shutil.which("MP4Box") is None, reason="needs MP4Box on PATH")
-def test_mp4box_encodes_and_decodes(tmp_path: Path) -> None:
-    write(small_face(), tmp_path / "a.bt")
-    subprocess.run(["MP4Box", "-mp4", "a.bt", "-out", "face.mp4"], cwd=tmp_path, check=True, timeout=60)
-    subprocess.run(["MP4Box", "-bt", "face.mp4"], cwd=tmp_path, check=True, timeout=60)
-    assert len(read_face(tmp_path / "face.bt").tables) == len(small_face().tables)
 
 
 def test_second_parser_reads_a_face() -> None:

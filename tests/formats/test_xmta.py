@@ -116,20 +116,18 @@ def test_streams_read_back(rate: float, suffix: str, tmp_path: Path) -> None:
 
 
 def test_the_updates_are_plain_xmta() -> None:
-    stream = FapStream.build(25, 3, {3: [0, 100, 100]}, visemes=[[0] * 4, [1, 0, 63, 0], [0] * 4])
+    stream = FapStream.build(25, 3, {3: [0, 100, 100]}, visemes=[[0] * 4, [1, 0, 0, 1], [0] * 4])
     text = xmta.to_text(small_face(), stream)
     assert text.endswith("""\
   </Replace>
   <par begin="0.04">
-   <Replace atNode="FAPS" atField="viseme">
-    <Viseme viseme_select1="1" viseme_blend="63"/>
-   </Replace>
+   <Replace atNode="VISEME" atField="viseme_select1" value="1"/>
+   <Replace atNode="VISEME" atField="viseme_def" value="true"/>
    <Replace atNode="FAPS" atField="open_jaw" value="100"/>
   </par>
   <par begin="0.08">
-   <Replace atNode="FAPS" atField="viseme">
-    <Viseme/>
-   </Replace>
+   <Replace atNode="VISEME" atField="viseme_select1" value="0"/>
+   <Replace atNode="VISEME" atField="viseme_def" value="false"/>
   </par>
  </Body>
 </XMT-A>
