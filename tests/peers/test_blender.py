@@ -69,9 +69,9 @@ np.savez(job["out"], **found)
 
 
 NAMES = (
-    "portable.usda", "portable.usdc", "portable.usdz", "native.usda", "native.usdc", "native.usdz", "turned_native.usdc",
-    "turned_portable.usdc", "face.glb",
-)  # fmt: skip
+    *(f"{profile}.{kind}" for profile in ("portable", "native") for kind in ("usda", "usdc", "usdz")),
+    *("turned_native.usdc", "turned_portable.usdc", "face.glb"),
+)
 
 
 @dataclass(frozen=True, eq=False)
