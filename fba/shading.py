@@ -53,7 +53,8 @@ class Shading:
     base : how the material's texture is laid on; None for a plain one.
     metallic_roughness : roughness in green, metal in blue; occlusion : in red; normal : in tangent space.
     opacity : the factor of the base colour's alpha.
-    alpha_mode : what alpha does, of `ALPHA_MODES`; mask draws where it reaches alpha_cutoff.
+    alpha_mode : what alpha does, of `ALPHA_MODES`; mask draws where it reaches alpha_cutoff. Empty where the file
+        leaves it open: then the material's transparency tells, and holes in its image.
     glow : factor of the material's emissive colour and of the map, above 1 for lights.
     """
 
@@ -68,7 +69,7 @@ class Shading:
     emissive: TextureMap | None = None
     glow: float = 1.0
     opacity: float = 1.0
-    alpha_mode: str = "opaque"
+    alpha_mode: str = ""
     alpha_cutoff: float = 0.5
     double_sided: bool = True
     unlit: bool = False

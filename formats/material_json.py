@@ -51,7 +51,7 @@ def _shading(row: Mapping[str, Any]) -> Shading:
         if entry.name in _MAPS:
             values[entry.name] = None if value is None else _map(value)
         elif entry.name == "alpha_mode":
-            values[entry.name] = _one_of(value, ALPHA_MODES)
+            values[entry.name] = _one_of(value, ("", *ALPHA_MODES))
         elif isinstance(default, bool):
             values[entry.name] = bool(value)
         else:

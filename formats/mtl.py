@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from fba.errors import InputFileError
 from fba.mesh import Material
+from fba.shading import Shading, TextureMap
 from formats.files import read_bytes
 
 _EXPONENT_SCALE = 128.0
@@ -20,8 +22,12 @@ _MAP_OPTION_VALUES = {
 """Options of map_Kd and how many values follow each at most."""
 
 
+_MAPS = {"norm": ".normal", "map_ke": ".emissive", "map_pr": ".rough_map", "map_pm": ".metal_map"}
+
+
 def read_mtl(path: Path) -> dict[str, Material]:
-    """Read a material library: newmtl, Kd, Ks, Ke, Ns, d, Tr and map_Kd; everything else is skipped.
+    """Read a material library: newmtl, Kd, Ks, Ke, Ns, d, Tr, map_Kd, and of the extension for physically based
+    rendering Pr, Pm, norm, map_Ke, map_Pr and map_Pm (both in one image); everything else is skipped.
 
     Raises
     ------
@@ -36,19 +42,35 @@ def read_mtl(path: Path) -> dict[str, Material]:
         rest = rest.strip()
         if keyword == "newmtl":
             if name is not None:
-                materials[name] = Material(name, **fields)  # type: ignore[arg-type]
+                materials[name] = _material(name, fields)
             name, fields = rest, {}
         elif name is not None:
             fields.update(_field(keyword.lower(), rest))
     if name is not None:
-        materials[name] = Material(name, **fields)  # type: ignore[arg-type]
+        materials[name] = _material(name, fields)
     return materials
+
+
+def _material(name: str, fields: dict[str, object]) -> Material:
+    """A material of its fields; those of a physically based surface begin with a point."""
+    plain = Material(name, **{k: v for k, v in fields.items() if not k.startswith(".")})  # type: ignore[arg-type]
+    own = {k[1:]: v for k, v in fields.items() if k.startswith(".")}
+    rough, metal = own.pop("rough_map", None), own.pop("metal_map", None)
+    if rough is not None and rough == metal:
+        own["metallic_roughness"] = rough
+    if not own:
+        return plain
+    own.setdefault("roughness", 1.0 - plain.shininess)
+    return replace(plain, shading=Shading(opacity=1.0 - plain.transparency, **own))  # type: ignore[arg-type]
 
 
 def _field(keyword: str, rest: str) -> dict[str, object]:
     if keyword == "map_kd":
         texture = _texture(rest)
         return {"texture": texture} if texture else {}
+    if keyword in _MAPS:
+        image = _texture(rest)
+        return {_MAPS[keyword]: TextureMap(image)} if image else {}
     try:
         numbers = [float(t) for t in rest.split()]
     except ValueError:
@@ -64,6 +86,8 @@ def _field(keyword: str, rest: str) -> dict[str, object]:
         return {"transparency": 1.0 - numbers[0]}
     if keyword == "tr":
         return {"transparency": numbers[0]}
+    if keyword in ("pr", "pm"):
+        return {{"pr": ".roughness", "pm": ".metallic"}[keyword]: min(max(numbers[0], 0.0), 1.0)}
     return {}
 
 
@@ -113,4 +137,18 @@ def format_mtl(materials: Iterable[Material]) -> str:
         lines.append(f"d {1.0 - m.transparency!r}")
         if m.texture:
             lines.append(f"map_Kd {m.texture}")
+        lines += [] if m.shading is None else _shading_lines(m.shading)
     return "\n".join(lines) + "\n"
+
+
+def _shading_lines(shading: Shading) -> list[str]:
+    """What the extension for physically based rendering says of a surface; occlusion has no place in it."""
+    lines = [f"Pr {shading.roughness!r}", f"Pm {shading.metallic!r}"]
+    if shading.metallic_roughness is not None:
+        image = shading.metallic_roughness.image
+        lines += [f"map_Pr -imfchan g {image}", f"map_Pm -imfchan b {image}"]
+    if shading.normal is not None:
+        lines.append(f"norm {shading.normal.image}")
+    if shading.emissive is not None:
+        lines.append(f"map_Ke {shading.emissive.image}")
+    return lines

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fba.arrays import Floats, Ints
-from fba.mesh import PolyMesh
+from fba.mesh import Material, PolyMesh
 from fba.scene import FaceScene
 from formats.files import atomic_output, write_bytes
 from formats.gathered import GatheredMesh, gather_mesh, original_order
 from formats.mtl import format_mtl
+from formats.names import unique_names
 
 
 def write_obj(
@@ -68,7 +70,7 @@ class ObjText:
             order = original_order(gathered.mesh, *polygons)
             if order is not None:
                 gathered = gathered.reordered(order)
-        self.gathered = gathered
+        self.gathered = replace(gathered, materials=_named(gathered.materials))
         self._scene = scene
         self._objects = objects and (len(gathered.shape_names) > 1 or gathered.shape_names[0] != "face")
         self._colors = colors if colors is not None and len(colors) == gathered.mesh.vertex_count else None
@@ -87,6 +89,12 @@ class ObjText:
             vertices = np.hstack([vertices, self._colors])
         lines = [*self._head, *_vertices(vertices, self._scene, self._objects), *self._tails[normals]]
         return ("\n".join(lines) + "\n").encode()
+
+
+def _named(materials: tuple[Material, ...]) -> tuple[Material, ...]:
+    """The materials under names of their own in one line, by which the library is read."""
+    labels = (" ".join(m.name.split()) or f"material_{i}" for i, m in enumerate(materials))
+    return tuple(replace(m, name=name) for m, name in zip(materials, unique_names(labels), strict=True))
 
 
 def _vertices(vertices: Floats, scene: FaceScene, objects: bool) -> list[str]:
@@ -122,7 +130,7 @@ def _faces(gathered: GatheredMesh, objects: bool, normals: bool) -> list[str]:
         state.append(("g", mesh.face_groups.tolist(), mesh.group_names))
     if mesh.face_materials is not None:
         # Index -1 (no material) falls on the last name.
-        names = (*(m.name or f"material_{i}" for i, m in enumerate(gathered.materials)), "default")
+        names = (*(m.name for m in gathered.materials), "default")
         state.append(("usemtl", mesh.face_materials.tolist(), names))
     now: list[int | None] = [-1 if keyword == "usemtl" else None for keyword, _, _ in state]
     lines: list[str] = []

@@ -199,7 +199,8 @@ class _Binary:
         table = np.frombuffer(self.data, row, element.rows, self.at) if element.rows else np.zeros(0, row)
         self.at += element.rows * row.itemsize
         own = [p.name for p in element.properties]
-        return np.stack([table[str(own.index(n))].astype(np.float64) for n in names], axis=1)
+        with np.errstate(invalid="ignore"):  # Signalling NaNs; refused later with all that is not finite.
+            return np.stack([table[str(own.index(n))].astype(np.float64) for n in names], axis=1)
 
     def lists(self, element: _Element, name: str) -> _Corners:
         self._check(element.rows * element.least_row)

@@ -60,7 +60,8 @@ def _binary(data: bytes) -> Floats | None:
     count = int.from_bytes(data[80:84], "little")
     if len(data) != _HEADER + count * _RECORD.itemsize:
         return None
-    return np.frombuffer(data, _RECORD, count, _HEADER)["corners"].astype(np.float64)
+    with np.errstate(invalid="ignore"):  # Signalling NaNs; refused below with all that is not finite.
+        return np.frombuffer(data, _RECORD, count, _HEADER)["corners"].astype(np.float64)
 
 
 def _ascii(path: Path, data: bytes) -> Floats:

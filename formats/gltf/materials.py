@@ -57,12 +57,14 @@ class Materials:
                 return None
             return self._reference(found)
 
-        shading = material.shading or self._plain(material)
+        plain = self._plain(material)
+        shading = material.shading or plain
         base = shading.base
         if material.texture is not None and (base is None or base.image != material.texture):
             base = _trilinear(material.texture)
         texture = reference(base if material.texture is not None else None)
-        white = texture is not None and material.shading is None
+        # Files that do not say how colour and image go together show the image alone.
+        white = texture is not None and (material.shading is None or material.shading.base is None)
         surface: Json = {
             "baseColorFactor": [*([1.0, 1.0, 1.0] if white else to_linear(material.diffuse)), _share(shading.opacity)],
             "metallicFactor": _share(shading.metallic),
@@ -78,8 +80,8 @@ class Materials:
         if texture is not None:
             surface["baseColorTexture"] = texture
         self._put_maps(entry, shading, reference)
-        mode = shading.alpha_mode
-        if mode == "mask" and (texture is not None or material.shading is not None):
+        mode = shading.alpha_mode or plain.alpha_mode
+        if mode == "mask" and (texture is not None or shading.alpha_mode != plain.alpha_mode):
             entry |= {"alphaMode": "MASK", "alphaCutoff": max(shading.alpha_cutoff, 0.0)}
         elif mode == "blend":
             entry["alphaMode"] = "BLEND"

@@ -296,7 +296,7 @@ PATHS = (
 )  # fmt: skip
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(path=st.sampled_from(PATHS), value=VALUES)
 def test_any_wrong_field_is_read_or_refused(tmp_path: Path, path: str, value: object) -> None:
     try:
@@ -306,7 +306,7 @@ def test_any_wrong_field_is_read_or_refused(tmp_path: Path, path: str, value: ob
     assert np.isfinite(scene.world_neutral()).all()
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(start=st.integers(0, len(GOOD)), length=st.integers(0, 8), new=st.binary(max_size=8))
 def test_damaged_bytes_are_read_or_refused(tmp_path: Path, start: int, length: int, new: bytes) -> None:
     (tmp_path / "a.glb").write_bytes(GOOD[:start] + new + GOOD[start + length :])

@@ -202,12 +202,6 @@ def test_a_face_in_any_axes_reads_back_exactly(axes: object, name: str, tmp_path
     assert sorted(p.name for p in tmp_path.iterdir()) == expected
 
 
-def test_the_shipped_face_reads_back_exactly(tmp_path: Path) -> None:
-    face = read_face("default")
-    write(face, tmp_path / "a.glb")
-    assert_same_face(read_face(tmp_path / "a.glb"), face)
-
-
 def test_a_plain_scene_keeps_its_polygons(tmp_path: Path) -> None:
     write(small_scene(), tmp_path / "a.glb")
     found = read(tmp_path / "a.glb")
@@ -296,7 +290,7 @@ def test_arrays_are_small_exact_and_inside_their_bytes() -> None:
             unpack.array({**wheres[0], **wrong}, np.int32)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_damaged_face_is_refused_or_read(data: st.DataObject, tmp_path: Path) -> None:
     path = tmp_path / "a.glb"

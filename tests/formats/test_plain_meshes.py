@@ -187,7 +187,7 @@ GOOD = (
 )
 
 
-@settings(max_examples=500, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     good=st.sampled_from(GOOD),
     where=st.floats(0, 1),
