@@ -20,6 +20,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 
 from benchmarks.fuzz_mutations import mutated
@@ -101,6 +102,7 @@ def target_of(kind: str) -> Target:
     return STREAMS[kind] if kind in STREAMS else _scene(kind)
 
 
+@cache
 def seeds(kind: str) -> list[bytes]:
     """Good files of a kind, small enough that mutations reach everything."""
     from benchmarks.fuzz_seeds import scene_seeds, stream_seeds
@@ -172,7 +174,7 @@ def by_coverage(kind: str, minutes: float, folder: Path) -> None:
             (corpus / f"seed_{k}").write_bytes(data)
             target(data)
     words = folder / f"words_{kind}.txt"
-    words.write_text("\n".join(f'"{w}"' for w in _words(pool)))
+    words.write_text("\n".join(f'"{w}"' for w in words_of(pool)))
     finds = Finds(kind, folder)
     limits = [
         f"-max_total_time={int(60 * minutes)}",
@@ -194,7 +196,7 @@ def by_coverage(kind: str, minutes: float, folder: Path) -> None:
     atheris.Fuzz()
 
 
-def _words(files: list[bytes]) -> list[str]:
+def words_of(files: list[bytes]) -> list[str]:
     """Words of the good files, for mutations to put in."""
     found = {w.decode() for data in files for w in re.findall(rb"[A-Za-z][A-Za-z0-9_:]{2,30}", data)}
     return sorted(found | {"-1", "1e999", "nan", "4294967296", "-0", "0x7fffffff"})
