@@ -15,7 +15,7 @@ from fba.scene import FaceScene
 from fba.stream import FapStream
 from formats.bifs.bt_commands import read_commands, write_commands
 from formats.bifs.changes import TICKS
-from formats.bifs.playing import played
+from formats.bifs.playing import played, remark
 from formats.bifs.scene import bifs_scene
 from formats.vrml97.parser import parse
 from formats.vrml97.printer import print_tree
@@ -51,7 +51,8 @@ def read(path: Path) -> FaceScene | AnimatableFace:
     """Read a .bt file, compressed or not; errors as for VRML97."""
     path = Path(path)
     text, findings = read_text(path)
-    return assemble(parse(text, str(path), bt=True), _stem(path), findings)
+    statements = parse(text, str(path), bt=True)
+    return assemble(statements, _stem(path), [*findings, *remark(len(read_commands(statements, str(path))))])
 
 
 def read_stream(path: Path) -> tuple[FapStream, list[Finding]]:

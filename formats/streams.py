@@ -12,19 +12,23 @@ from fba.stream import FapStream
 
 @dataclass(frozen=True, slots=True)
 class StreamFormat:
-    """A kind of stream file."""
+    """A kind of stream file.
+
+    in_faces : its files hold a face, which the stream moves.
+    """
 
     name: str
     extensions: tuple[str, ...]
     writes: bool = True
+    in_faces: bool = False
 
 
 FAP_TEXT = StreamFormat("FAP text", (".fap",))
 FBA_BITSTREAM = StreamFormat("FBA bitstream", (".fba",))
 ARKIT_CURVES = StreamFormat("ARKit curves", (".csv",))
 MOUTH_CUES = StreamFormat("Rhubarb mouth cues", (".json", ".tsv"), writes=False)
-BT_UPDATES = StreamFormat("MPEG-4 BT", (".bt",), writes=False)
-XMTA_UPDATES = StreamFormat("MPEG-4 XMT-A", (".xmt", ".xmta"), writes=False)
+BT_UPDATES = StreamFormat("MPEG-4 BT", (".bt",), writes=False, in_faces=True)
+XMTA_UPDATES = StreamFormat("MPEG-4 XMT-A", (".xmt", ".xmta"), writes=False, in_faces=True)
 
 STREAM_FORMATS = (FAP_TEXT, FBA_BITSTREAM, ARKIT_CURVES, MOUTH_CUES, BT_UPDATES, XMTA_UPDATES)
 

@@ -28,11 +28,6 @@ def points_of(found: FaceScene | AnimatableFace, file: Path, landmarks: Path | N
     return None if beside is None else read_landmarks(beside, scene_of(found))
 
 
-def remarks_of(scene: FaceScene) -> list[Finding]:
-    """What the reader of a file had to leave out or to guess."""
-    return [Finding("info", "file", remark) for remark in getattr(scene.document, "remarks", ())]
-
-
 def left_behind(scene: FaceScene, read_from: Path, written_to: Path) -> list[Finding]:
     """Textures that the file that was read names, but that are neither beside nor in the one that was written."""
     gone = missing_textures(scene)

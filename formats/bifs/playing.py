@@ -23,6 +23,9 @@ from formats.vrml97.writer import NOT_INITIALIZED
 MAX_FRAMES = 500_000
 """Frames of a stream at most: five and a half hours at 25 a second."""
 
+_LATEST = 1e9
+"""Seconds: later times count as this, which is beyond every last frame."""
+
 _RATES = (25.0, 30.0, 24.0, 50.0, 60.0, 30000 / 1001, 24000 / 1001, 100.0, 120.0)
 """Frame rates that are tried, the first that fits all times counts."""
 
@@ -79,7 +82,7 @@ def played(
     if note is None:
         note = {"frame_rate": _rate([u.seconds for u in known], findings), "frames": None, "name": name}
     rate = note["frame_rate"]
-    at = np.rint(np.array([u.seconds for u in known]) * rate)
+    at = np.rint(np.minimum([u.seconds for u in known], _LATEST) * rate)
     count = float(at.max(initial=0.0)) + 1.0
     if count > MAX_FRAMES:
         raise FapStreamError(f"{source}: the last update would be frame {count:.0f}; {MAX_FRAMES} are read at most")
@@ -160,6 +163,12 @@ class _State:
         names = HIGH_LEVEL[k][2]
         if field in names and isinstance(value, (int, float)) and abs(value) < NOT_INITIALIZED:
             self.high[k][names.index(field)] = round(value)
+
+
+def remark(updates: int) -> list[Finding]:
+    """What the reader of a face says about updates of the file."""
+    message = f"{updates} timed updates move this face; read as a stream (fba convert FILE OUT.fap), not with the face"
+    return [Finding("info", "stream", message)] if updates else []
 
 
 def plain_value(value: Value) -> float | VrmlNode | None:

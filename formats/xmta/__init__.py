@@ -12,7 +12,7 @@ from fat.face import AnimatableFace
 from fba.findings import Finding
 from fba.scene import FaceScene
 from fba.stream import FapStream
-from formats.bifs.playing import played
+from formats.bifs.playing import played, remark
 from formats.bifs.scene import bifs_scene
 from formats.vrml97.reader import assemble
 from formats.vrml97.text import write_text
@@ -34,7 +34,8 @@ def read(path: Path) -> FaceScene | AnimatableFace:
         If the file cannot be read, holds no polygon mesh, or contradicts itself.
     """
     path = Path(path)
-    return assemble(read_document(read_xml(path), str(path)).statements, _stem(path), [])
+    document = read_document(read_xml(path), str(path))
+    return assemble(document.statements, _stem(path), remark(len(document.updates)))
 
 
 def read_stream(path: Path) -> tuple[FapStream, list[Finding]]:

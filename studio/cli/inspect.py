@@ -22,7 +22,7 @@ def inspect(
     from formats.streams import STREAM_FORMATS
     from studio.cli.console import console, findings_json, print_findings, print_json
 
-    if any(file.suffix.lower() in kind.extensions for kind in STREAM_FORMATS):
+    if any(file.suffix.lower() in kind.extensions for kind in STREAM_FORMATS if not kind.in_faces):
         about, findings = _stream(file)
     else:
         about, findings = _face(file, landmarks)
@@ -50,7 +50,7 @@ def _face(file: Path, landmarks: Path | None) -> tuple[dict[str, Any], list[Any]
     from formats import read
     from formats.textures import missing_textures
     from studio.describe import describe_face, describe_points, describe_scene, mesh_findings
-    from studio.inputs import remarks_of, scene_of, target_points
+    from studio.inputs import scene_of, target_points
 
     found = read(file)
     textures = [
@@ -67,7 +67,7 @@ def _face(file: Path, landmarks: Path | None) -> tuple[dict[str, Any], list[Any]
         if points is not None:
             more, neutral = describe_points(scene, points)
             about, findings = {**about, **more}, [*findings, *neutral]
-    return {"file": str(file), "kind": kind, **about}, [*remarks_of(scene), *mesh_findings(scene), *textures, *findings]
+    return {"file": str(file), "kind": kind, **about}, [*mesh_findings(scene), *textures, *findings]
 
 
 def _print(about: dict[str, Any], out: Any) -> None:

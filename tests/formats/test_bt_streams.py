@@ -72,7 +72,9 @@ def test_the_updates_are_plain_bifs(tmp_path: Path) -> None:
 
 def test_a_stream_does_not_stay_in_the_face(tmp_path: Path) -> None:
     write(small_face(), tmp_path / "a.bt", patchy_stream())
-    write(read_face(tmp_path / "a.bt"), tmp_path / "b.bt")
+    face = read_face(tmp_path / "a.bt")
+    assert [f.code for f in getattr(face.scene.document, "findings", ())] == ["stream"]
+    write(face, tmp_path / "b.bt")
     write(small_face(), tmp_path / "c.bt")
     write(read_face(tmp_path / "c.bt"), tmp_path / "d.bt")
     assert (tmp_path / "b.bt").read_bytes() == (tmp_path / "d.bt").read_bytes()
