@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cloning.backends import find_backend
-from cloning.ec import ClonedTransfer, morph, motion_maps
+from cloning.ec import EVEN, ClonedTransfer, evened, morph, motion_maps
 from cloning.ec_rules import rule_points
 from cloning.prepare import PreparedFace, prepare
 from cloning.source import source_motions
@@ -100,6 +100,32 @@ def test_one_wild_place_does_not_blow_motion_up() -> None:
     copy = surface.vertices.copy()
     copy[40] += [0.0, 0.0, 30.0]
     assert np.linalg.norm(motion_maps(surface, copy), axis=(1, 2)).max() < 30.0
+
+
+def test_turn_and_growth_are_evened_out_over_a_length_whatever_the_mesh() -> None:
+    spread = []
+    for n in (21, 41):
+        surface = sheet(n)
+        alone = np.zeros((n * n, 3, 3))
+        alone[n * n // 2] = np.eye(3)
+        found = evened(surface, alone)[:, 0, 0]
+        away = np.sum((surface.vertices - surface.vertices[n * n // 2]) ** 2, axis=1)
+        spread.append(float(np.sqrt((found @ away) / found.sum())))
+    assert 0.5 * EVEN < spread[1] < 1.5 * EVEN
+    assert abs(spread[0] / spread[1] - 1.0) < 0.1
+    same = np.broadcast_to(TURN, (81, 3, 3))
+    assert np.allclose(evened(sheet(), same), same)
+
+
+def test_skin_far_from_the_morph_rests_where_it_can_be_seen(mine: PreparedFace, yours: PreparedFace) -> None:
+    skin = yours.skin
+    behind = np.clip(skin.positions["7.1"][2] - skin.vertices[:, 2], 0.0, None)
+    long = replace(skin, vertices=skin.vertices - np.stack([0.0 * behind, 0.0 * behind, 0.6 * behind], axis=1))
+    jaw = np.zeros((mine.skin.vertex_count, 1, 3))
+    jaw[mine.skin.vertices[:, 2] > mine.skin.positions["7.1"][2], 0, 1] = 0.1
+    moved = find_backend("ec").build(mine, replace(yours, skin=long), False).apply(jaw)
+    assert (behind > 0.6).sum() > 100
+    assert not moved[behind > 0.6].any()
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["default", "published"])

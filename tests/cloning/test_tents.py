@@ -147,6 +147,7 @@ def test_a_face_given_its_own_motions_makes_them_again(source: AnimatableFace, t
     cut = skin.triangles.ravel(), 3 * np.arange(len(skin.triangles) + 1, dtype=np.int32)
     still = (~motions.any(axis=(1, 2))).astype(float)
     polygons = cut if triangulated else skin.polygons
+    assert set(np.diff(polygons[1])) == ({3} if triangulated else {4, 5, 6, 7})
     transfer = tent_transfer(skin.vertices, skin.vertices, polygons, still, links=skin.links)
     assert relative(transfer.apply(motions), motions).max() < 1e-8
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from cloning.backends import find_backend
 from cloning.local_transfer import BareTransfer, GoalTransfer
@@ -14,8 +16,12 @@ from cloning.resampling import resample
 from cloning.source import source_motions
 from cloning.transfer import build_face_transfer
 from fat import AnimatableFace
+from fat.evaluate import Player
 from fba.arrays import Floats
 from fba.scene import Role
+from formats import read_face
+from samples import sample
+from studio.cli.app import app
 
 FEW = (3, 5, 12, 19, 31)
 
@@ -127,3 +133,19 @@ def test_place_turn_and_size_of_the_target_do_not_matter(mine: PreparedFace) -> 
     assert (plain.kept == other.kept).mean() > 0.98
     error = np.linalg.norm(other.vertices - (2.0 * (plain.vertices @ turn.T) + 3.0), axis=1)[both]
     assert np.percentile(error, 99) < 1e-6
+
+
+def test_the_command_line_writes_the_papers_form_as_a_face_that_plays(mine: PreparedFace, tmp_path: Path) -> None:
+    out = tmp_path / "paper.wrl"
+    words = ["clone", str(sample("faces/tri_head.obj")), "-o", str(out), "--backend", "vtc", "--faps", "3,12"]
+    result = CliRunner().invoke(app, [*words, "--as-published"])
+    assert result.exit_code == 0, result.output
+    assert "the skin has the source's polygons" in " ".join(result.output.split())
+    face = read_face(out)
+    skin = face.scene.with_role(Role.SKIN)[0]
+    arities = np.diff(skin.mesh.offsets)
+    assert set(arities) <= {4, 5, 6, 7}, "the source's; the target is of triangles"
+    assert 0.6 * len(mine.skin.polygons[1]) < len(arities) < len(mine.skin.polygons[1])
+    rest, open_mouth = (Player(face).pose(values).world_shapes()[skin.name] for values in ({}, {3: 600}))
+    assert np.array_equal(rest, face.scene.world_vertices(skin.name))
+    assert np.linalg.norm(open_mouth - rest, axis=1).max() > 0.2 * face.fapu.es0
