@@ -6,6 +6,7 @@ import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from benchmarks.analogy import itself_sheet, truth_sheet
 from cloning import clone
 from fat.evaluate import Player
 from fba.high_level import BLEND_MAX
@@ -106,10 +107,16 @@ def combining() -> None:
     sheet.save(FOLDER / "combining.png")
 
 
+def analogy() -> None:
+    """Expressions on pictures of other heads and on the source itself: docs/analogy.md."""
+    truth_sheet("quad_head", "light from the other side", shrink=2).save(FOLDER / "analogy_truth.png")
+    itself_sheet(shrink=2).save(FOLDER / "analogy_itself.png")
+
+
 def main(*wanted: str) -> None:
     """Draw these pictures; all without names."""
     FOLDER.mkdir(exist_ok=True)
-    pictures = {"hero": hero, "faps": faps, "combining": combining}
+    pictures = {"hero": hero, "faps": faps, "combining": combining, "analogy": analogy}
     for name in wanted or pictures:
         pictures[name]()
 
