@@ -199,7 +199,7 @@ def stream_seeds(kind: str) -> list[bytes]:
     )
     plain = FapStream.build(30, 3, {3: [0, 90, 0], 19: [0, 1024, 0], 49: [0, 20000, -500]})
     if kind == "fba":
-        return [encode_fba(s, q)[0] for s in (short, plain) for q in (0, 1, 9)]
+        return [encode_fba(s, q)[0] for s in (short, plain) for q in (None, 0, 1, 9)]
     if kind == "csv":
         return [format_arkit_csv(s)[0].encode() for s in (short, plain)]
     if kind == "cues":
