@@ -109,8 +109,8 @@ class Materials:
                 entry[key] = texture if amount == 1.0 else texture | {factor: amount}
         extensions: Json = {}
         if shading.unlit:
-            extensions[UNLIT] = {}
-        if shading.glow != 1.0:
+            extensions[UNLIT] = {}  # Such a surface does not glow.
+        elif shading.glow != 1.0:
             extensions[EMISSIVE_STRENGTH] = {"emissiveStrength": max(shading.glow, 0.0)}
         if extensions:
             entry["extensions"] = extensions

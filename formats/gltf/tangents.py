@@ -12,6 +12,9 @@ from fba.arrays import Bools, Floats, Ints
 from fba.mesh import Material, PolyMesh
 from formats.gltf.buffers import Rows
 
+_SLIM = 1e-6
+"""Sine of the angle below which 32-bit texture coordinates no longer tell on which side an image lies."""
+
 
 def normal_map_set(material: Material | None) -> int | None:
     """The set of texture coordinates of a material's normal map; None without one."""
@@ -29,7 +32,9 @@ def mirrored(mesh: PolyMesh, corners: Ints) -> Bools:
     indices = mesh.texcoord_indices[corners].reshape(-1, 3)
     uv = mesh.texcoords[indices]
     first, second = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    turned: Bools = (first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]) & (indices >= 0).all(axis=1)
+    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    slim = _SLIM * np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
+    turned: Bools = (area < -slim) & (indices >= 0).all(axis=1)
     return np.repeat(turned, 3)
 
 

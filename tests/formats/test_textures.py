@@ -47,8 +47,9 @@ def obj_file(folder: Path, name: str) -> Path:
 def vrml_file(folder: Path, name: str) -> Path:
     uv = ", ".join(f"{u} {v}" for u, v in UV)
     (folder / "a.wrl").write_text(
-        f'#VRML V2.0 utf8\nShape {{ appearance Appearance {{ texture ImageTexture {{ url "{quote(name)}" }} }} geometry '
-        "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 1 0 ] } coordIndex [ 0 1 2 -1 0 2 3 ] "
+        f'#VRML V2.0 utf8\nShape {{ appearance Appearance {{ texture ImageTexture {{ url "{quote(name)}" }} }} '
+        "geometry IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 1 0 ] } "
+        "coordIndex [ 0 1 2 -1 0 2 3 ] "
         f"texCoord TextureCoordinate {{ point [ {uv} ] }} }} }}\n",
         "utf-8",
     )

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import MODULES, open_page, program
+from dressed import FULL, IMAGES, SKIN, dressed
 from faces import small_face
 from PIL import Image
 
@@ -158,8 +159,16 @@ def test_the_khronos_validator_finds_nothing_to_complain_about(default: Animatab
     write(small.scene, tmp_path / "scene.glb")
     write(default, tmp_path / "all motions.gltf", stream)
     gltf.write_shape_set(small.scene, profile_shapes(small, "vrm")[0], tmp_path / "vrm.glb")
+    full = {name: png() for name in IMAGES}
+    write(replace(small, scene=replace(dressed(), images=full)), tmp_path / "surfaces.glb", stream)
+    flat = replace(SKIN, shading=replace(FULL, unlit=True))
+    write(replace(dressed(flat), images=full), tmp_path / "unlit.glb")
+    webp = io.BytesIO()
+    Image.new("RGB", (8, 8), (200, 150, 120)).save(webp, "webp")
+    write(replace(small.scene, images={"face.png": webp.getvalue()}), tmp_path / "webp.glb")
+    write(gltf.read_foreign(tmp_path / "surfaces.glb"), tmp_path / "again.glb")
     found = validate(*sorted(tmp_path.glob("*.gl*")))
-    assert len(found) == 5
+    assert len(found) == 9
     for name, report in found.items():
         assert (report["errors"], report["warnings"]) == (0, 0), (name, report["messages"])
     assert found["textured.glb"]["info"]["hasTextures"]
