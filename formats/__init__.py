@@ -38,6 +38,7 @@ register(
         carries_tables=True,
         names_images=True,
         carries_streams=True,
+        portable=True,
     )
 )
 register(

@@ -8,7 +8,7 @@ from fat.face import AnimatableFace
 from fba.scene import FaceScene
 from fba.stream import FapStream
 
-__all__ = ["read", "write"]
+__all__ = ["read", "write", "write_portable"]
 
 _HEADER = """<?xml version="1.0" encoding="UTF-8"?>
 <X3D profile="Immersive" version="4.0">
@@ -55,3 +55,8 @@ def write(face: FaceScene | AnimatableFace, path: Path, stream: FapStream | None
     from formats.x3d.xml_nodes import print_xml
 
     write_text(_HEADER + print_xml(x3d_statements(face, stream)) + _FOOTER, Path(path))
+
+
+def write_portable(face: FaceScene | AnimatableFace, path: Path, stream: FapStream | None = None) -> None:
+    """Write a file for clients that know no MPEG-4 nodes: the same as `write`, which uses none."""
+    write(face, path, stream)

@@ -124,6 +124,23 @@ def test_eyes_turn_by_interpolators_with_fap_values_as_keys(tmp_path: Path) -> N
     np.testing.assert_allclose(inside, rotation_matrix((1.0, 0.0, 0.0, 0.05))[:3, :3], atol=1e-12)
 
 
+@pytest.mark.parametrize("frames", [0, 1])
+@pytest.mark.parametrize("extension", ["wrl", "x3d"])
+def test_a_stream_of_one_frame_or_none_is_a_pose(frames: int, extension: str, tmp_path: Path) -> None:
+    path = tmp_path / f"face.{extension}"
+    played = FapStream.build(25.0, frames, {3: [400] * frames})
+    write(small_face(), path, played, portable=extension == "wrl")
+    text = path.read_text()
+    assert ("fba_clock" in text) == bool(frames)
+    if frames:
+        wanted = {"wrl": "key [ 0 ]", "x3d": 'key="0"'}[extension]
+        assert wanted in text
+        assert {"wrl": "keyValue [ 400 ]", "x3d": 'keyValue="400"'}[extension] in text
+    found = read(path)
+    assert isinstance(found, AnimatableFace)
+    assert_same_face(found, small_face())
+
+
 def test_two_tables_on_one_field_are_refused(tmp_path: Path) -> None:
     face = small_face()
     again = FaceDefTable(26, 1, (), (FaceDefTransform("eye_left_yaw", rotation_def=(1.0, 0.0, 0.0, 1.0)),))

@@ -52,6 +52,8 @@ def test_a_face_with_a_stream_comes_back_exactly(frame: Frame, extension: str, t
     found = read(path)
     assert isinstance(found, AnimatableFace)
     assert_same_face(found, face)
+    write(face, tmp_path / f"portable.{extension}", stream(), portable=True)
+    assert (tmp_path / f"portable.{extension}").read_bytes() == path.read_bytes()
 
 
 def test_a_scene_comes_back_without_a_humanoid(tmp_path: Path) -> None:
