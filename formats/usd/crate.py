@@ -26,7 +26,7 @@ def impossible_count(data: bytes) -> str | None:
     if not 0 <= table <= len(data) - 8:
         return None
     (sections,) = struct.unpack_from("<Q", data, table)
-    if sections > (len(data) - table) // 32:
+    if sections > (len(data) - table - 8) // 32:
         return f"its table of contents claims {sections} sections"
     for number in range(sections):
         name, start, size = struct.unpack_from("<16sqq", data, table + 8 + 32 * number)
