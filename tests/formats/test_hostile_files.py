@@ -23,6 +23,7 @@ from fba.scene import FaceScene
 from formats import read, read_scene, write
 from formats.gltf import data as gltf_data
 from formats.textures import texture_bytes, texture_names
+from formats.usd.crate import impossible_count
 
 CORNERS = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
@@ -96,6 +97,15 @@ def test_numbers_in_headers_are_compared_with_the_bytes(tmp_path: Path) -> None:
     refused(tmp_path / "x.stl", bytes(80) + b"\xff\xff\xff\xff" + bytes(50), "cut")
     refused(tmp_path / "x.off", b"OFF\n400000000 400000000 0\n0 0 0\n", "cut")
     refused(tmp_path / "x.wfm", b"# VERTEX LIST:\n4000000000\n0 0 0\n", "coordinates")
+
+
+def test_tables_of_a_usd_crate_that_end_with_the_file() -> None:
+    """One whose last section is cut by some bytes is told, or left to OpenUSD."""
+    for cut in range(64):
+        sections = b"".join(name.ljust(16, b"\0") + (24).to_bytes(8, "little") * 2 for name in (b"TOKENS", b"PATHS"))
+        data = b"PXR-USDC".ljust(16, b"\0") + (24).to_bytes(8, "little") + (2).to_bytes(8, "little") + sections
+        said = impossible_count(data[: len(data) - cut])
+        assert "claims 2 sections" in str(said) if cut else said is not None
 
 
 def test_very_many_objects_are_one(tmp_path: Path) -> None:
