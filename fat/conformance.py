@@ -208,7 +208,7 @@ class Probe:
             return 0.0
         rim = way > _RIM_SHARE * way.max()
         center = fit_sphere(rest)[0]
-        return 2.0 * widening(rest[rim], moved[rim] - rest[rim], self._rest[point] - center)
+        return 2.0 * widening(rest[rim] - self._rest[point], moved[rim] - rest[rim], self._rest[point] - center)
 
 
 def widening(rim: Floats, way: Floats, gaze: Floats) -> float:
@@ -216,20 +216,20 @@ def widening(rim: Floats, way: Floats, gaze: Floats) -> float:
 
     Parameters
     ----------
-    rim, way : (n, 3) vertices on it and their offsets.
+    rim, way : (n, 3) vertices on it, from the pupil's point, and their offsets.
     gaze : (3,) across the ring, of any length; +Z, where a neutral face looks, if it is far from that.
 
     Notes
     -----
-    Measured across the gaze, from the place where the lines of the ways meet. A pupil's rim lies on an iris or on
+    Measured across the gaze, from the place where the lines of the ways meet (next to the pupil's point where they
+    meet nowhere). A pupil's rim lies on an iris or on
     a bulge and goes up or down on it as well, which makes it no wider; and the feature point of the pupil lies on the
     cornea before it, or beside the middle of a ring that a mesh has no round vertices for.
     """
-    local = rim - rim.mean(axis=0)
     if not gaze[2] > _SQUINT * np.linalg.norm(gaze):
         gaze = np.array([0.0, 0.0, 1.0])
     plane = np.linalg.svd(gaze[None])[2][1:]
-    places, ways = local @ plane.T, way @ plane.T
+    places, ways = rim @ plane.T, way @ plane.T
     lengths = np.linalg.norm(ways, axis=1, keepdims=True)
     across = (ways / np.maximum(lengths, 1e-300))[:, ::-1] * [-1.0, 1.0]
     middle = np.linalg.lstsq(across, np.einsum("ij,ij->i", across, places), rcond=1e-6)[0]

@@ -125,12 +125,18 @@ def flips(vertices: Floats, triangles: Ints, offsets: Floats) -> float:
     A triangle moves when the offset of a corner is more than 1e-9 of the largest. Triangles without area at rest
     have no normal and are left out.
     """
-    moving = _moving(offsets)[triangles].any(axis=1)
+    moving, turned = turned_over(vertices, triangles, offsets)
+    return 100.0 * len(turned) / moving if moving else 0.0
+
+
+def turned_over(vertices: Floats, triangles: Ints, offsets: Floats) -> tuple[int, Ints]:
+    """How many triangles move, and which of them turn over; see `flips`."""
+    moving = np.flatnonzero(_moving(offsets)[triangles].any(axis=1))
     before = _normals(vertices, triangles[moving])
     after = _normals(vertices + offsets, triangles[moving])
     solid = np.einsum("ij,ij->i", before, before) > 0.0
-    turned = np.einsum("ij,ij->i", before, after)[solid] < 0.0
-    return 100.0 * float(turned.mean()) if turned.size else 0.0
+    turned: Ints = moving[solid & (np.einsum("ij,ij->i", before, after) < 0.0)].astype(np.int32)
+    return int(np.count_nonzero(solid)), turned
 
 
 def _moving(offsets: Floats) -> Bools:
@@ -259,4 +265,5 @@ __all__ = [
     "opening_change",
     "roughness",
     "truth_error",
+    "turned_over",
 ]

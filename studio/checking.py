@@ -2,79 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from fat.build import face_motions
 from fat.conformance import FapConformance, conformance
-from fat.evaluate import Player, Pose
+from fat.evaluate import Player
 from fat.face import AnimatableFace
 from fat.fap_quality import FapQuality
-from fat.motion import FaceMotion
-from fat.quality import fap_error, fap_values, feature_point_motion, flips, lid_gap, lip_gap_change
 from fat.validate import validate
-from fba.amplitudes import amplitudes
-from fba.arrays import Floats
-from fba.faps import EXPRESSION_FAP, LOW_LEVEL_FAPS, VISEME_FAP
+from fba.faps import LOW_LEVEL_FAPS
 from fba.findings import Finding
-from fba.high_level import BLEND_MAX
-from fba.scene import Role
-from studio.fap_measuring import measure_faps
+from studio.fidelity import Fidelity, fidelity
+from studio.judging import Measured, measure, verdicts
+from studio.verdicts import Verdict
 
-FP_ERROR_MUST = 0.01
-"""Largest mean relative error over all feature points of a motion."""
-LIP_GAP_MUST = 0.01
-"""MNS; largest change of the lips' opening against the source."""
-LID_GAP_MUST = 0.05
-"""IRISD; how much wider than the source's an eye may stay open after a blink."""
-FLIPS_MUST = 0.3
-"""Percent of moving triangles beyond the source's, mean over all motions at their normal amplitudes."""
-BLINK = {19: 1024.0, 20: 1024.0}
-
-
-@dataclass(frozen=True, slots=True)
-class Fidelity:
-    """A clone beside its source; means and worst values over the motions that both have.
-
-    fp_error : relative error over all feature points and FAP axes (0.01 = 1 %).
-    unasked : motions whose feature points stay still on the source, but not on the clone.
-    lip_gap : largest change of the lips' opening in MNS.
-    lid_gap : how much wider the worse eye stays open after a blink, in IRISD; None without eyelid FAPs.
-    flips : percent of moving skin triangles turned by more than 90 degrees.
-    """
-
-    motions: int
-    unasked: tuple[str, ...]
-    fp_error_mean: float
-    fp_error_worst: float
-    fp_error_worst_motion: str
-    lip_gap: float
-    lip_gap_motion: str
-    lid_gap: float | None
-    flips_mean: float
-    source_flips_mean: float
-
-    def failures(self) -> list[Finding]:
-        """Everything beyond the limits above."""
-        rows = [
-            ("fp-error", self.fp_error_mean, FP_ERROR_MUST, "mean feature point error beside the source"),
-            ("lip-gap", self.lip_gap, LIP_GAP_MUST, f"lips open differently in {self.lip_gap_motion}, MNS"),
-            ("lid-gap", self.lid_gap or 0.0, LID_GAP_MUST, "eyes stay open after a blink, IRISD beyond the source"),
-            ("flips", self.flips_mean - self.source_flips_mean, FLIPS_MUST, "% of triangles flip beyond the source's"),
-        ]
-        findings = [
-            Finding("error", code, f"{text}: {value:.3g}, at most {limit:g}")
-            for code, value, limit, text in rows
-            if value > limit
-        ]
-        return findings + [
-            Finding("error", "unasked", "feature points move that are still on the source", name)
-            for name in self.unasked
-        ]
+TOLD_BY_FAP = ("own-fp", "cross-talk", "in-eyes", "seams", "lining", "hidden-stretch", "flips-worst")
+"""Measures whose failures are told FAP by FAP, in findings of their own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +30,7 @@ class CheckResult:
 
     unmeasured : low-level FAPs with a table, but without a feature point to measure them at.
     quality : the measures of each FAP (both directions), viseme and expression.
+    verdicts : every measure at its worst place, beside the source's, see `studio.measures`.
     source_quality : the same rows of the source, where it has them. A face that is checked by itself must keep every
         limit; a clone inherits its source's flaws, so beside a source only what is worse there is told, as warnings.
     """
@@ -94,6 +42,7 @@ class CheckResult:
     fidelity: Fidelity | None
     quality: tuple[FapQuality, ...] = ()
     source_quality: tuple[FapQuality, ...] | None = None
+    verdicts: tuple[Verdict, ...] = ()
 
     @cached_property
     def remarks(self) -> tuple[Finding, ...]:
@@ -102,7 +51,8 @@ class CheckResult:
         for row, beside in self.compared:
             out += row.remarks()
             out += [] if beside is None else row.failures(beside)
-        return tuple(out)
+        told = [v.finding() for v in self.verdicts if v.failed and not v.measure.must and v.code not in TOLD_BY_FAP]
+        return (*out, *told)
 
     @cached_property
     def compared(self) -> tuple[tuple[FapQuality, FapQuality | None], ...]:
@@ -122,7 +72,8 @@ class CheckResult:
                 out.append(Finding("error", "own-fp", text, f"FAP {fap.fap_id}"))
         for row, beside in self.compared:
             out += row.failures() if beside is None else []
-        return (*out, *(self.fidelity.failures() if self.fidelity else ()))
+        told = {"neutral", "own-fp"} | ({"cross-talk"} if self.source_quality is None else set())
+        return (*out, *(v.finding() for v in self.verdicts if v.failed and v.measure.must and v.code not in told))
 
     @property
     def passed(self) -> bool:
@@ -134,6 +85,7 @@ class CheckResult:
             "passed": self.passed,
             "neutral_unchanged": self.neutral_unchanged,
             "findings": [asdict(f) for f in (*self.problems, *self.remarks, *self.findings)],
+            "measures": [v.to_dict() for v in self.verdicts],
             "faps": [{**asdict(f), "relative_error": f.relative_error, "passed": f.passed} for f in self.faps],
             "unmeasured": list(self.unmeasured),
             "quality": [row.to_dict() for row in self.quality],
@@ -158,88 +110,24 @@ def check_face(
     findings = (*file_findings, *validate(face))
     if any(f.severity == "error" for f in findings):
         return CheckResult(findings, True, (), (), None)
-    neutral = Player(face).pose().local
-    unchanged = all(neutral[s.name].tobytes() == s.mesh.vertices.tobytes() for s in face.scene.shapes)
-    measured = tuple(conformance(face))
-    seen = {fap.fap_id for fap in measured}
+    mine = _measured(face)
+    theirs = None if source is None else _measured(source)
+    beside = None if source is None else fidelity(face, source)
+    seen = {fap.fap_id for fap in mine.own}
     unmeasured = tuple(t.name for t in face.tables if t.fap_id in LOW_LEVEL_FAPS and t.fap_id not in seen)
     return CheckResult(
         findings,
-        unchanged,
-        measured,
+        mine.neutral == 0.0,
+        mine.own,
         unmeasured,
-        None if source is None else fidelity(face, source),
-        tuple(measure_faps(face)),
-        None if source is None else tuple(measure_faps(source)),
+        beside,
+        mine.rows,
+        None if theirs is None else theirs.rows,
+        verdicts(mine, theirs, beside),
     )
 
 
-def fidelity(face: AnimatableFace, source: AnimatableFace) -> Fidelity | None:
-    """Compare every motion that both faces have; None if there is none."""
-    mine = {(m.fap_id, m.select, m.value): m for m in face_motions(face)}
-    theirs = {(m.fap_id, m.select, m.value): m for m in face_motions(source)}
-    common = [key for key in theirs if key in mine]
-    if not common:
-        return None
-    errors, lips = {}, {}
-    for key in common:
-        a, b = _points(source, theirs[key]), _points(face, mine[key])
-        name = f"{theirs[key].name} at {theirs[key].value}"
-        errors[name] = fap_error(fap_values(a, source.fapu), fap_values(b, face.fapu)).relative
-        lips[name] = lip_gap_change(a, source.fapu, b, face.fapu)
-    finite = {k: v for k, v in errors.items() if np.isfinite(v)}
-    worst = max(finite, key=lambda k: finite[k], default="")
-    lip = max(lips, key=lambda k: lips[k])
-    return Fidelity(
-        len(common),
-        tuple(name for name in errors if name not in finite),
-        float(np.mean(list(finite.values()))) if finite else 0.0,
-        finite.get(worst, 0.0),
-        worst,
-        lips[lip],
-        lip,
-        _lid_gap_beyond(face, source),
-        _flips(face, source),
-        _flips(source, face),
-    )
-
-
-def _points(face: AnimatableFace, motion: FaceMotion) -> dict[str, Floats]:
-    return feature_point_motion(face.feature_points, motion.offsets)
-
-
-def _flips(face: AnimatableFace, other: AnimatableFace) -> float:
-    """Mean share of flipped triangles, in percent, at the normal amplitudes of all motions that both faces have."""
-    keys = {t.key for t in face.tables if t.meshes} & {t.key for t in other.tables if t.meshes}
-    skins = [(s.name, face.scene.world_vertices(s.name), s.mesh.triangles) for s in face.scene.with_role(Role.SKIN)]
-    player = Player(face)
-    values = []
-    for pose in (pose for key in sorted(keys) for pose in _normal_poses(player, *key)):
-        moved = pose.world_shapes()
-        for name, vertices, triangles in skins:
-            offsets = moved[name] - vertices
-            if offsets.any():
-                values.append(flips(vertices, triangles, offsets))
-    return float(np.mean(values)) if values else 0.0
-
-
-def _normal_poses(player: Player, fap_id: int, select: int) -> Iterator[Pose]:
-    if fap_id == VISEME_FAP:
-        yield player.pose(viseme=(select, 0, BLEND_MAX))
-    elif fap_id == EXPRESSION_FAP:
-        yield player.pose(expression=(select, BLEND_MAX, 0, 0))
-    else:
-        for value in amplitudes()[fap_id].values:
-            yield player.pose({fap_id: value})
-
-
-def _lid_gap_beyond(face: AnimatableFace, source: AnimatableFace) -> float | None:
-    gaps: list[Mapping[str, float]] = []
-    for one in (source, face):
-        if any(one.tables.get(number) is None for number in BLINK):
-            return None
-        rest = one.feature_points.positions(one.scene)
-        moved = one.feature_points.positions(one.scene, Player(one).pose(BLINK).world_shapes())
-        gaps.append(lid_gap(rest, {k: moved[k] - rest[k] for k in rest}, one.fapu))
-    common = gaps[0].keys() & gaps[1].keys()
-    return max((gaps[1][k] - gaps[0][k] for k in common), default=None)
+def _measured(face: AnimatableFace) -> Measured:
+    neutral = Player(face).pose().local
+    off = [float(np.abs(neutral[s.name] - s.mesh.vertices).max(initial=0.0)) for s in face.scene.shapes]
+    return measure(face, max(off, default=0.0) / face.fapu.es0, conformance(face))

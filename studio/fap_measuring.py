@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from cloning.eyeballs import Ball, balls
-from cloning.labels import label
-from cloning.lining import coming_through, lining
-from cloning.prepare import PreparedFace
+from cloning.lining import coming_through
 from cloning.rigid import fit_rigid
-from cloning.surface import Surface, build_surface
-from cloning.visibility import visible
 from fat.conformance import FapConformance, Probe
 from fat.evaluate import Player, Pose
 from fat.face import AnimatableFace
@@ -21,11 +16,12 @@ from fat.fap_quality import FapQuality, independent_motion, mirrored, parted, pe
 from fat.quality import asymmetry, flips, mirror_map
 from fat.tables import FaceDefTable
 from fba.amplitudes import amplitudes
-from fba.arrays import Bools, Floats, Ints
-from fba.errors import LandmarkError, MeshError
+from fba.arrays import Floats, Ints
+from fba.errors import MeshError
 from fba.faps import EXPRESSION_FAP, VISEME_FAP, fap
 from fba.high_level import BLEND_MAX
 from fba.scene import Role
+from studio.checked_skin import CheckedSkin, check_skin
 
 SYMMETRIC = 1e-3
 """Eye separations by which the vertices of a symmetric mesh may miss their mirror images."""
@@ -40,57 +36,30 @@ _PARTS = (
 """What is symmetric or not, each for itself."""
 
 
-def measure_faps(face: AnimatableFace) -> list[FapQuality]:
+def measure_faps(face: AnimatableFace, skin: CheckedSkin | None = None) -> list[FapQuality]:
     """Measure a face whose tables can be played.
+
+    Parameters
+    ----------
+    skin : its skin, where it is there already.
 
     Returns
     -------
     A row for each direction of each low-level FAP, each viseme and each expression that has a table, in the order
     of the tables, positive direction first. What cannot be measured on this face is None.
     """
-    measurer = _Measurer(face)
+    measurer = _Measurer(face, skin or check_skin(face))
     return [row for table in face.tables for row in measurer.rows(table)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Skin:
-    """All skin of a face as one surface.
-
-    Attributes
-    ----------
-    seen : (n,) what can be seen on the neutral face.
-    hidden : (e, 2) edges with an end that cannot.
-    labels : (n,) lips and lids, see `cloning.labels`.
-    lining : (m,) vertices that line the inside, see `cloning.lining`.
-    linear : shape name -> (3, 3) from its local directions to the world's.
-    """
-
-    surface: Surface
-    seen: Bools
-    hidden: Ints
-    labels: Ints
-    lining: Ints
-    linear: Mapping[str, Floats]
-
-    def offsets(self, face: AnimatableFace, pose: Pose, es0: float) -> Floats:
-        """(n, 3) offsets without what transforms do, in eye separations."""
-        parts = []
-        for name in self.surface.shapes:
-            moved = pose.local[name] - face.scene.shape(name).mesh.vertices
-            parts.append(moved @ self.linear[name].T)
-        offsets: Floats = np.concatenate(parts) / es0
-        return offsets
-
-
 class _Measurer:
-    def __init__(self, face: AnimatableFace) -> None:
+    def __init__(self, face: AnimatableFace, skin: CheckedSkin | None) -> None:
         self.face = face
         self.player = Player(face, rules=())
         self.rest = self.player.pose().world_shapes()
         self.points = face.feature_points.positions(face.scene, self.rest)
         self.probe = Probe(face, self.rest)
-        self.skin = _skin(face)
-        self.eyeballs = _eyeballs(face, self.skin)
+        self.skin = skin
         self.sides = _sides(face)
 
     def rows(self, table: FaceDefTable) -> Iterator[FapQuality]:
@@ -125,13 +94,13 @@ class _Measurer:
         )
         if self.skin is None:
             return row
-        surface, es0 = self.skin.surface, self.face.fapu.es0
-        near, wide = (self.skin.offsets(self.face, p, es0) for p in (pose, far))
+        surface = self.skin.surface
+        near, wide = (self.skin.offsets(self.face, p) for p in (pose, far))
         return replace(
             row,
             flips=flips(surface.vertices, surface.triangles, near),
             flips_at_limit=flips(surface.vertices, surface.triangles, wide),
-            stretch=stretch(surface.vertices, self.skin.hidden, near),
+            stretch=stretch(surface.vertices, self.skin.hidden_edges, near),
             parted=parted(surface.links, wide),
             through=len(coming_through(surface, self.skin.seen, self.skin.labels, self.skin.lining, near)),
         )
@@ -161,11 +130,11 @@ class _Measurer:
         return independent_motion(fap(table.fap_id), motion, self.face.fapu, max(steps, default=0.0))
 
     def _penetration(self, world: Mapping[str, Floats]) -> float | None:
-        if self.skin is None or not self.eyeballs:
+        if self.skin is None or not self.skin.eyeballs:
             return None
         places = np.concatenate([world[n] for n in self.skin.surface.shapes])
         before, after = [], []
-        for ball, names in self.eyeballs:
+        for ball, names in self.skin.eyeballs:
             rest = np.concatenate([self.rest[n] for n in names])
             way = np.concatenate([world[n] for n in names]) - rest
             rigid = fit_rigid(rest, way[:, None], ball.center)
@@ -187,36 +156,6 @@ class _Measurer:
         other = self._pose(fap_id, table.high_level_select, at).world_shapes()
         mine, yours = (np.concatenate([w[n] for n in names]) - rest for w in (world, other))
         return asymmetry(mine, yours, partner)
-
-
-def _skin(face: AnimatableFace) -> _Skin | None:
-    """The skin, with its hidden edges; None without a skin."""
-    names = [s.name for s in face.scene.with_role(Role.SKIN)]
-    try:
-        surface = build_surface(face.scene, face.feature_points, names, face.fapu.es0)
-        whole = build_surface(face.scene, face.feature_points, [s.name for s in face.scene.shapes], face.fapu.es0)
-    except LandmarkError:
-        return None
-    shown = whole.split(visible(whole).astype(np.float64))
-    seen = np.concatenate([shown[name] > 0.0 for name in names])
-    edges = surface.edges
-    linear = {name: face.scene.world_matrix(name)[:3, :3] for name in names}
-    labels = label(surface).values
-    hidden = edges[~seen[edges].all(axis=1)]
-    return _Skin(surface, seen, hidden, labels, lining(surface, seen, labels), linear)
-
-
-def _eyeballs(face: AnimatableFace, skin: _Skin | None) -> list[tuple[Ball, list[str]]]:
-    """The eyeballs that are there, each with the names of its shapes."""
-    if skin is None or not {"3.5", "3.6"} <= set(face.feature_points):
-        return []
-    prepared = PreparedFace(face.scene, face.feature_points, face.fapu, skin.surface, label(skin.surface), ())
-    shapes = [
-        names
-        for role in (Role.EYE_LEFT, Role.EYE_RIGHT)
-        if (names := [s.name for s in face.scene.with_role(role) if s.mesh.vertex_count])
-    ]
-    return list(zip(balls(prepared), shapes, strict=True))
 
 
 def _sides(face: AnimatableFace) -> tuple[list[str], Ints] | None:

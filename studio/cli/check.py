@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fat.face import AnimatableFace
     from fat.fap_quality import FapQuality
     from studio.checking import CheckResult
+    from studio.verdicts import Verdict
 
 COLUMNS = (
     ">FAP",
@@ -33,6 +34,8 @@ COLUMNS = (
     "",
 )
 
+MEASURE_COLUMNS = ("measure", ">worst", ">source's", ">fails above", "unit", "", "verdict", "where")
+
 
 def check(
     face: FacePath,
@@ -43,6 +46,10 @@ def check(
     sheet: Annotated[
         Path | None, typer.Option(help="Also draw every FAP, viseme and expression into this .png.")
     ] = None,
+    worst_picture: Annotated[
+        Path | None,
+        typer.Option(help="Also draw the worst place of each measure that is not good into this .png."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Check conformance and quality of every FAP, viseme and expression; ends with 1 when something fails."""
@@ -50,12 +57,17 @@ def check(
     from studio.checking import check_face, check_file
     from studio.cli.console import print_json
 
-    if sheet is not None:
-        _check_sheet(sheet)
+    for name, path in (("--sheet", sheet), ("--worst-picture", worst_picture)):
+        if path is not None:
+            _check_picture(name, path)
     animatable = read_face(str(face))
-    result = check_face(animatable, None if source is None else read_face(source), check_file(face))
-    if sheet is not None and not any(f.severity == "error" for f in result.findings):
+    beside = None if source is None else read_face(source)
+    result = check_face(animatable, beside, check_file(face))
+    plays = not any(f.severity == "error" for f in result.findings)
+    if sheet is not None and plays:
         _draw(animatable, sheet)
+    if worst_picture is not None and plays:
+        _draw_worst(animatable, beside, result, worst_picture)
     if as_json:
         print_json({"file": str(face), **result.to_dict()})
     else:
@@ -64,11 +76,11 @@ def check(
         raise typer.Exit(Outcome.FINDINGS)
 
 
-def _check_sheet(path: Path) -> None:
+def _check_picture(name: str, path: Path) -> None:
     from formats.files import require_folder
 
     if path.suffix.lower() != ".png":
-        usage(f"--sheet {path}: the reference sheet is a .png")
+        usage(f"{name} {path}: the picture is a .png")
     require_folder(path)
 
 
@@ -79,6 +91,16 @@ def _draw(face: AnimatableFace, path: Path) -> None:
 
     with progress() as tell:
         save_png(tall_sheet(fap_sheets(face, progress=tell)), path)
+
+
+def _draw_worst(face: AnimatableFace, source: AnimatableFace | None, result: CheckResult, path: Path) -> None:
+    from studio.cli.console import progress
+    from studio.sheet import save_png
+    from studio.worst_places import worst_places
+
+    with progress() as tell:
+        tell("drawing the worst places", 0.0)
+        save_png(worst_places(face, result.verdicts, source), path)
 
 
 def _print(result: CheckResult, worst: bool) -> None:
@@ -95,13 +117,21 @@ def _print(result: CheckResult, worst: bool) -> None:
         )
         if result.source_quality is not None:
             out.print("in brackets: the source's, where it differs")
-    if result.fidelity is not None:
-        for name, value in result.to_dict()["fidelity"].items():  # type: ignore[attr-defined]
-            out.print(f"{name}: {value:.4g}" if isinstance(value, float) else f"{name}: {value}")
+    if result.verdicts:
+        table("", MEASURE_COLUMNS, [_measure_cells(v) for v in result.verdicts], out)
     if result.unmeasured:
         out.print("not measured, for lack of a feature point on a surface: " + ", ".join(result.unmeasured))
     print_findings((*result.problems, *result.remarks, *result.findings), out)
     out.print("passed" if result.passed else "FAILED")
+
+
+def _measure_cells(verdict: Verdict) -> tuple[str, ...]:
+    """One line of the table of measures."""
+    measure = verdict.measure
+    unit = "" if measure.rule == "times" else measure.unit
+    numbers = ["-" if v is None else f"{v:.3g}" for v in (verdict.value, verdict.source, verdict.limit)]
+    where = verdict.where if verdict.place.point is None else f"{verdict.where} {verdict.place.point}".strip()
+    return measure.title, *numbers, unit, "must" if measure.must else "", verdict.word, where
 
 
 def _cells(row: FapQuality, beside: FapQuality | None) -> tuple[str, ...]:

@@ -1,0 +1,228 @@
+"""Measure every motion of a face for what means something beside the source's: see `studio.verdicts`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fat.evaluate import Player, Pose
+from fat.face import AnimatableFace
+from fat.fap_quality import DEPTH
+from fat.intersections import crossing
+from fat.lip_contact import lip_depth
+from fat.quality import edge_stretch, roughness
+from fat.tearing import SLACK, bending, jumps
+from fba.amplitudes import amplitudes
+from fba.arrays import Bools, Floats, Ints
+from fba.faps import EXPRESSION_FAP, VISEME_FAP
+from fba.high_level import BLEND_MAX
+from fba.scene import Role
+from studio.checked_skin import CheckedSkin
+
+MOVING = 0.02
+"""Share of the largest offset from which a place takes part in a motion."""
+
+TORN = 10
+"""A tear is as steep as its tenth-steepest edge: one or two bad edges are a flaw of the mesh, not a tear."""
+
+EAR_FAPS = (65, 66, 67, 68)
+UPPER, LOWER = 1, 2
+"""Labels of the lips, see `cloning.labels`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A measure and where it is worst: a vertex of the joined skin, or a feature point."""
+
+    value: float
+    vertex: int | None = None
+    point: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MotionMeasures:
+    """The measures of one motion at its normal amplitude.
+
+    Attributes
+    ----------
+    key : FAP, select, value.
+    grain : typical length of the edges that move, in eye separations.
+    spots : measure -> its value here; what cannot be measured is absent.
+    """
+
+    key: tuple[int, int, int]
+    name: str
+    grain: float
+    spots: Mapping[str, Spot]
+
+    @property
+    def where(self) -> str:
+        """The motion's name for messages."""
+        return self.name if self.key[0] <= EXPRESSION_FAP else f"{self.name} at {self.key[2]:+d}"
+
+
+def pose_of(player: Player, key: tuple[int, int, int]) -> Pose:
+    """The face in a motion: FAP, select, value."""
+    fap_id, select, value = key
+    if fap_id == VISEME_FAP:
+        return player.pose(viseme=(select, 0, value))
+    if fap_id == EXPRESSION_FAP:
+        return player.pose(expression=(select, value, 0, 0))
+    return player.pose({fap_id: value})
+
+
+def measure_motions(face: AnimatableFace, skin: CheckedSkin) -> list[MotionMeasures]:
+    """Measure all motions of a face whose tables can be played, both directions of each FAP."""
+    measurer = _Measurer(face, skin)
+    return [
+        measurer.motion((table.fap_id, table.high_level_select, value), table.name)
+        for table in face.tables
+        for value in ((BLEND_MAX,) if table.fap_id <= EXPRESSION_FAP else amplitudes()[table.fap_id].values)
+    ]
+
+
+class _Measurer:
+    def __init__(self, face: AnimatableFace, skin: CheckedSkin) -> None:
+        self.face, self.skin = face, skin
+        self.player = Player(face, rules=())
+        self.rest = self.player.pose().world_shapes()
+        self.upper, self.lower = (
+            np.flatnonzero((skin.labels == k) & skin.seen).astype(np.int32) for k in (UPPER, LOWER)
+        )
+        self.lip_rest = self._lip_depth(np.zeros_like(skin.surface.vertices))
+
+    def motion(self, key: tuple[int, int, int], name: str) -> MotionMeasures:
+        """All measures of one motion."""
+        pose = pose_of(self.player, key)
+        world = pose.world_shapes()
+        offsets = self.skin.offsets(self.face, pose)
+        size = np.linalg.norm(offsets, axis=1)
+        moving = size > MOVING * size.max(initial=0.0)
+        edges = self.skin.seen_edges
+        edges = edges[moving[edges].any(axis=1)]
+        ends = self.skin.surface.vertices[edges]
+        grain = float(np.median(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1))) if len(edges) else 0.0
+        spots = dict(self._shape(offsets, moving, edges))
+        spots |= self._contacts(offsets, moving, world)
+        if key[0] not in EAR_FAPS and self.skin.back.any():
+            behind = np.where(self.skin.back, size, 0.0)
+            spots["still"] = _worst(behind)
+        return MotionMeasures(key, name, grain, spots)
+
+    def _shape(self, offsets: Floats, moving: Bools, edges: Ints) -> Iterator[tuple[str, Spot]]:
+        """How smoothly the skin moves."""
+        rest = self.skin.surface.vertices
+        if not len(edges):
+            yield from ((name, Spot(0.0)) for name in ("tear", "stretch99", "noise", "bend"))
+            return
+        steep = jumps(rest, edges, offsets)
+        order = np.argsort(-steep, kind="stable")
+        yield "tear", Spot(float(steep[order[min(TORN, len(order)) - 1]]), int(edges[order[0], 0]))
+        yield "stretch99", Spot(edge_stretch(rest, edges, offsets), _longest(rest, edges, offsets))
+        rough = roughness(self.skin.surface.edges, offsets)
+        yield "noise", Spot(rough, int(edges[order[0], 0]))
+        bends = self.skin.seen_hinges
+        bends = bends[moving[bends].any(axis=1)]
+        degrees = bending(rest, bends, offsets)
+        if len(degrees):
+            yield "bend", Spot(float(np.percentile(degrees, 95)), int(bends[int(np.argmax(degrees)), 0]))
+
+    def _contacts(self, offsets: Floats, moving: Bools, world: Mapping[str, Floats]) -> dict[str, Spot]:
+        """What the skin sinks into."""
+        spots = {}
+        if len(self.upper) and len(self.lower):
+            lips = moving[self.upper].any() or moving[self.lower].any()
+            depth, vertices = self._lip_depth(offsets) if lips else self.lip_rest
+            added = np.maximum(depth - self.lip_rest[0], 0.0)
+            spots["lip-depth"] = Spot(float(added.max()), int(vertices[int(np.argmax(added))]))
+        for name, places in self._obstacles.items():
+            spots[name] = self._collisions(name, places, world)
+        return spots
+
+    def _lip_depth(self, offsets: Floats) -> tuple[Floats, Ints]:
+        surface, fapu = self.skin.surface, self.face.fapu
+        places = surface.vertices + offsets
+        return lip_depth(places, surface.normals_of(places), self.upper, self.lower, fapu.mns0 / fapu.es0)
+
+    def _collisions(self, name: str, obstacle: _Obstacle, world: Mapping[str, Floats]) -> Spot:
+        """Percent of the watched skin that crosses something in a motion, but not at rest."""
+        some = np.arange(len(obstacle.watched), dtype=np.int32)
+        if all(np.array_equal(world[n], self.rest[n]) for names, _ in obstacle.bodies for n in names):
+            moved = [np.any(world[n] != self.rest[n], axis=1) for n in self.skin.surface.shapes]
+            some = some[np.concatenate(moved)[self.skin.surface.triangles[obstacle.watched]].any(axis=1)]
+        here = some[self._crossing(obstacle, world, some)] if len(some) else some
+        new = here[~np.isin(here, self._at_rest[name])]
+        vertex = int(self.skin.surface.triangles[obstacle.watched[new[0]], 0]) if len(new) else None
+        return Spot(100.0 * len(new) / len(obstacle.watched), vertex)
+
+    def _crossing(self, obstacle: _Obstacle, world: Mapping[str, Floats], some: Ints) -> Ints:
+        """Which of some of the watched triangles cross a body."""
+        corners = self.skin.surface.triangles[obstacle.watched[some]]
+        skin = np.concatenate([world[n] for n in self.skin.surface.shapes])[corners]
+        found = []
+        for shapes, center in obstacle.bodies:
+            moved = sum(float(len(world[n])) for n in shapes)
+            shift = sum((world[n] - self.rest[n]).sum(axis=0) for n in shapes) / moved
+            for shape in shapes:
+                places = world[shape]
+                if center is not None:
+                    middle = center + shift
+                    places = middle + (1.0 - DEPTH) * (places - middle)
+                found.append(crossing(skin, places[self.face.scene.shape(shape).mesh.triangles]))
+        hit: Ints = np.unique(np.concatenate(found))
+        return hit
+
+    @cached_property
+    def _at_rest(self) -> dict[str, Ints]:
+        return {
+            n: self._crossing(o, self.rest, np.arange(len(o.watched), dtype=np.int32))
+            for n, o in self._obstacles.items()
+        }
+
+    @cached_property
+    def _obstacles(self) -> dict[str, _Obstacle]:
+        """Eyeballs before the lids, teeth before the lips; what is not there is absent."""
+        found = {}
+        triangles = self.skin.surface.triangles
+        teeth = [s.name for r in (Role.UPPER_TEETH, Role.LOWER_TEETH) for s in self.face.scene.with_role(r)]
+        teeth = [name for name in teeth if len(self.face.scene.shape(name).mesh.triangles)]
+        lips = np.isin(self.skin.labels, (UPPER, LOWER))
+        balls = []
+        around = np.zeros(len(lips), dtype=bool)
+        for ball, names in self.skin.eyeballs:
+            around[ball.vertices[ball.rest[:, 2] > ball.center[2]]] = True
+            balls.append((tuple(names), ball.center))
+        for name, where, bodies in (
+            ("lids", around, tuple(balls)),
+            ("teeth", lips, tuple(((n,), None) for n in teeth)),
+        ):
+            watched = np.flatnonzero(where[triangles].all(axis=1)).astype(np.int32)
+            if bodies and len(watched):
+                found[name] = _Obstacle(watched, bodies)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Obstacle:
+    """What skin must not sink into: triangles (t,) of the skin, and bodies by their shapes.
+
+    A body with a centre is made smaller about it by DEPTH, which is how far skin may sink in.
+    """
+
+    watched: Ints
+    bodies: tuple[tuple[tuple[str, ...], Floats | None], ...]
+
+
+def _worst(values: Floats) -> Spot:
+    at = int(np.argmax(values))
+    return Spot(float(values[at]), at)
+
+
+def _longest(vertices: Floats, edges: Ints, offsets: Floats) -> int:
+    """An end of the edge that changes its length most, measured beside it and SLACK."""
+    moved = vertices + offsets
+    before, after = (np.linalg.norm(v[edges[:, 0]] - v[edges[:, 1]], axis=1) + SLACK for v in (vertices, moved))
+    return int(edges[int(np.argmax(np.abs(np.log(after / before)))), 0])
