@@ -55,10 +55,17 @@ def coming_through(surface: Surface, seen: Bools, labels: Ints, inner: Ints, off
     inner : (m,) of `lining`.
     offsets : (n, 3) in eye separations.
     """
-    outer = np.flatnonzero(seen).astype(np.int32)
-    if not len(outer) or not len(inner):
+    if not len(inner):
+        return inner
+    places = surface.vertices + offsets
+    reach = places[inner].min(axis=0) - THICK, places[inner].max(axis=0) + THICK
+    around = seen & np.all((places >= reach[0]) & (places <= reach[1]), axis=1)
+    outer = np.flatnonzero(around).astype(np.int32)
+    # Lining lies behind the skin at rest; both together must go as far as what shows.
+    way = sum(float(np.linalg.norm(offsets[k], axis=1).max(initial=0.0)) for k in (inner, outer))
+    if not len(outer) or way < BEFORE:
         return inner[:0]
-    away, height = _above(surface, surface.vertices + offsets, outer, inner, labels)
+    away, height = _above(surface, places, outer, inner, labels)
     found: Ints = inner[(away < THICK) & (height > np.maximum(BEFORE, STEEP * away))]
     return found
 
