@@ -123,6 +123,7 @@ def eye_mover(source: PreparedFace, target: PreparedFace, mine: Body, yours: Bod
     size = fit_sphere(yours.vertices)[1] / fit_sphere(mine.vertices)[1]
     iris = target.fapu.irisd0 / source.fapu.irisd0
     gaze = (target.place(pupil) - center_t) / np.linalg.norm(target.place(pupil) - center_t)
+    gaze_s = (source.place(pupil) - center_s) / np.linalg.norm(source.place(pupil) - center_s)
     away = yours.vertices - center_t
     along = away @ gaze
     front = (along > 0.0)[:, None]
@@ -140,39 +141,42 @@ def eye_mover(source: PreparedFace, target: PreparedFace, mine: Body, yours: Bod
         if soft.any():
             rest = offsets - motion.offsets(mine.vertices, center_s, np.ones(3))
             goals = _at(at_pupil[0], offsets[:, soft]) * ratio
-            wanted = _farthest(iris * rest[:, soft])
+            wanted = _farthest(iris * rest[:, soft], gaze_s)
             out[:, soft] += _exact(
                 iris * np.einsum("nc,nckd->nkd", weights, rest[corners][:, :, soft]),
                 out[:, soft],
                 goals,
                 wanted,
                 at_pupil[1],
+                gaze,
             )
         return out
 
     return move
 
 
-def _exact(added: Floats, rigid: Floats, goals: Floats, wanted: Floats, rows: Floats) -> Floats:
+def _exact(added: Floats, rigid: Floats, goals: Floats, wanted: Floats, rows: Floats, gaze: Floats) -> Floats:
     """What is added (n, K, 3) to a rigid motion: its rim goes as far as wanted (K,), the pupil's point to its goal.
 
     Parameters
     ----------
     goals : (k, K, 3) of the points of rows (k, n); k is 0 where the pupil is no point of the ball.
+    gaze : (3,) unit, across which the rim's way counts.
     """
     for _ in range(PASSES):
-        far = _farthest(added)
+        far = _farthest(added, gaze)
         added = added * np.clip(wanted / np.maximum(far, 1e-300), 1.0 / COARSER, COARSER)[:, None]
         for row, goal in zip(rows, goals, strict=False):
             added += row[:, None, None] * (goal - _at(row[None], rigid + added)[0]) / (row @ row)
     return added
 
 
-def _farthest(offsets: Floats) -> Floats:
-    """(K,) mean length of the offsets (n, K, 3) that are nearly the longest: a rim's."""
+def _farthest(offsets: Floats, gaze: Floats) -> Floats:
+    """(K,) mean way across the gaze of the offsets (n, K, 3) that are nearly the longest: a rim's."""
     length = np.linalg.norm(offsets, axis=2)
     rim = length > RIM * length.max(axis=0)
-    mean: Floats = (length * rim).sum(axis=0) / np.maximum(rim.sum(axis=0), 1)
+    across = np.linalg.norm(offsets - (offsets @ gaze)[:, :, None] * gaze, axis=2)
+    mean: Floats = (across * rim).sum(axis=0) / np.maximum(rim.sum(axis=0), 1)
     return mean
 
 
