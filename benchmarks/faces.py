@@ -43,7 +43,7 @@ from formats.landmarks import read_landmarks
 from samples import sample
 from samples.build.arkit_docs import put_tables
 from samples.build.makehuman import open_makehuman
-from studio.checking import Fidelity, fidelity
+from studio.fidelity import Fidelity, fidelity
 from studio.inputs import scene_of
 from studio.landmark_sheet import marked
 from studio.render import Figure, make_renderer
