@@ -191,7 +191,9 @@ def _value(kind: str, text: str, where: str) -> Value:
     values = read_decimals(text) if text.strip() else np.zeros(0)
     if values is None:
         try:
-            values = np.array(text.replace(",", " ").split(), dtype=np.float64)
-        except ValueError:
+            # Pixels may be hexadecimal.
+            words = text.replace(",", " ").split()
+            values = np.array([int(w, 16) if w[:2] in ("0x", "0X") else float(w) for w in words], dtype=np.float64)
+        except (ValueError, OverflowError):
             raise InputFileError(f"{where} must be numbers, not '{text[:40]}'") from None
     return Numbers(values, many)

@@ -183,6 +183,7 @@ FOREIGN = """<?xml version="1.0"?>
  <ProtoInstance name='odd'/>
  <Transform DEF='up' translation='0 1 0'>
   <Shape DEF='tri'><Appearance><Material diffuseColor='1 0 0'/><ImageTexture url='"a.png" "b.png"'/></Appearance>
+   <PixelTexture image='1 1 4 0x00FFFFFF'/>
    <IndexedTriangleSet index='0 1 2 2 1 3'><Coordinate DEF='c' point='0 0 0, 1 0 0, 0 1 0, 1 1 0'/></IndexedTriangleSet>
   </Shape>
   <LOD><Shape DEF='quad'><IndexedFaceSet coordIndex='0 1 3 2 -1' solid='FALSE'><Coordinate USE='c'/></IndexedFaceSet>
@@ -217,7 +218,7 @@ def test_files_of_other_programs_give_their_meshes(tmp_path: Path) -> None:
         ("<svg/>", InputFileError, "no X3D file"),
         ("<X3D><head/></X3D>", InputFileError, "no <Scene>"),
         ("<X3D><Scene/></X3D>", InputFileError, "no polygon mesh"),
-        (FOREIGN.replace("0 1 2 2 1 3", "0 1 x"), InputFileError, r"line 7: IndexedTriangleSet.index must be numbers"),
+        (FOREIGN.replace("0 1 2 2 1 3", "0 1 x"), InputFileError, r"line 8: IndexedTriangleSet.index must be numbers"),
         (FOREIGN.replace("solid='FALSE'", "solid='maybe'"), InputFileError, "must be true or false"),
         (FOREIGN.replace("0 1 2 2 1 3", "0 1 2 2 1 9"), FbaError, "9"),
         ('<!DOCTYPE X3D [<!ENTITY a "aaaa">]><X3D><Scene>&a;</Scene></X3D>', TextSyntaxError, "document type"),
