@@ -118,7 +118,8 @@ class _Printer:
 
     def interface(self, item: Interface, depth: int) -> Iterator[str]:
         said = attribute("name", item.name) + attribute("type", item.type) + attribute("vrml97Hint", item.access)
-        yield from self.valued("field", said, item.value, depth)
+        value = Nodes((), item.type == "MFNode") if item.type.endswith("Node") and item.value == Empty() else item.value
+        yield from self.valued("field", said, value, depth)
 
     def valued(self, tag: str, said: str, value: Value | None, depth: int) -> Iterator[str]:
         """An element with a value as attribute or as nodes in it."""

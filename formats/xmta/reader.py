@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from fba.arrays import Floats
 from fba.errors import InputFileError
 from formats.bifs.playing import Update, plain_value
-from formats.vrml97.numbers import read_decimals
 from formats.vrml97.parser import MAX_DEPTH
 from formats.vrml97.tree import (
     BodyItem,
-    Booleans,
-    Empty,
     ExternProto,
     Field,
     Interface,
     Is,
     Nodes,
-    Numbers,
     Proto,
     Route,
     Statement,
@@ -33,15 +25,24 @@ from formats.vrml97.tree import (
 )
 from formats.xml_tree import Element
 from formats.xmta.fields import field_type
+from formats.xmta.values import ValueReader
 
-_CHUNK = 1 << 21
-"""Characters of numbers that are converted at once: bounds the memory."""
+_TYPES = {
+    **{name: f"SF{name}" for name in ("Color", "Float", "Image", "Node", "Rotation", "String", "Time")},
+    **{f"{name}s": f"MF{name}" for name in ("Color", "Float", "Image", "Node", "Rotation", "String", "Time")},
+    "Boolean": "SFBool",
+    "Integer": "SFInt32",
+    "Vector2": "SFVec2f",
+    "Vector3": "SFVec3f",
+    "Booleans": "MFBool",
+    "Integers": "MFInt32",
+    "Vector2Array": "MFVec2f",
+    "Vector3Array": "MFVec3f",
+    "Vector2s": "MFVec2f",
+    "Vector3s": "MFVec3f",
+}
+"""Names of types in XMT-A that are not those of VRML97."""
 
-_STRING = re.compile(r"""[\s,]*(["'])((?:[^\\]|\\.)*?)\1(?=\s|\Z)""", re.DOTALL)
-"""A quoted string. Its end is a quotation mark before white space: some writers leave the marks inside unescaped."""
-
-_ESCAPE = re.compile(r"\\(.)", re.DOTALL)
-_NUMBER = re.compile(r"[+-]?(?:0[xX][0-9a-fA-F]+|[0-9.]+(?:[eE][+-]?[0-9]+)?|I)")
 _OWN = frozenset({"DEF", "USE", "binaryID"})
 """Attributes of nodes that are no fields."""
 
@@ -67,13 +68,10 @@ def read_document(root: Element, source: str) -> Document:
     return _Reader(source).document(root)
 
 
-class _Reader:
+class _Reader(ValueReader):
     def __init__(self, source: str) -> None:
-        self.source = source
+        super().__init__(source)
         self.protos: dict[str, Mapping[str, str]] = {}
-
-    def fail(self, element: Element, message: str) -> InputFileError:
-        return InputFileError(f"{self.source}: line {element.line}: {message}")
 
     # --- commands -------------------------------------------------------------------------------------------
 
@@ -152,6 +150,7 @@ class _Reader:
     def interface(self, element: Element, depth: int) -> Interface:
         said = element.attributes
         name, kind, access = (said.get(k, "") for k in ("name", "type", "vrml97Hint"))
+        kind = _TYPES.get(kind, kind)
         if not (name and kind and access):
             raise self.fail(element, "a <field> needs name, type and vrml97Hint")
         value: Value | None = None
@@ -166,7 +165,7 @@ class _Reader:
                 return self.nodes(child, child.tag == "nodes", depth)
         if any(c.tag[:1].isupper() for c in element.children) or (kind or "").endswith("Node"):
             return self.nodes(element, kind == "MFNode" or len(element.children) > 1, depth)
-        text = element.attributes.get("value")
+        text = next((v for k, v in element.attributes.items() if k.lower().endswith("value")), None)
         return None if text is None else self.value(text, kind, element)
 
     # --- nodes ----------------------------------------------------------------------------------------------
@@ -228,78 +227,6 @@ class _Reader:
                 raise self.fail(element, f"<{element.tag[:40]}> is no node")
             items.append(None if element.tag == "NULL" else self.node(element, depth + 1))
         return Nodes(tuple(items) if items or many else (None,), many)
-
-    # --- values ---------------------------------------------------------------------------------------------
-
-    def value(self, text: str, kind: str | None, element: Element) -> Value:
-        """The value of an attribute; a field of unknown type is taken for what its text looks like."""
-        many = kind is not None and kind.startswith("M")
-        base = _guessed(text) if kind is None else kind[2:]
-        if many and not text.strip():
-            return Empty()
-        if base == "String":
-            if many or (kind is None and text.lstrip()[:1] == '"'):
-                return Strings(_strings(text), True)
-            return Strings((text,))
-        if base == "Bool":
-            words = text.lower().split()
-            if not words or any(w not in ("true", "false", "1", "0") for w in words):
-                raise self.fail(element, f"expected true or false, found {text[:40]!r}")
-            return Booleans(tuple(w in ("true", "1") for w in words), many)
-        if base == "Node":
-            return Nodes((), True) if many else Nodes((None,))
-        values = self.numbers(text, element)
-        return Numbers(values, many or (kind is None and values.size > 4))
-
-    def numbers(self, text: str, element: Element, count: int | None = None) -> Floats:
-        parts: list[Floats] = []
-        at = 0
-        while at < len(text):
-            stop = len(text) if len(text) - at <= _CHUNK else text.rfind(" ", at, at + _CHUNK) + 1
-            if stop <= at:
-                raise self.fail(element, "expected a number, found a very long word")
-            piece = text[at:stop]
-            values = read_decimals(piece)
-            parts.append(np.array([self.number(w, element) for w in _words(piece)]) if values is None else values)
-            at = stop
-        found = np.concatenate(parts) if parts else np.zeros(0)
-        if not found.size or (count is not None and found.size != count):
-            raise self.fail(element, f"expected {'a number' if count else 'numbers'}, found {text[:40]!r}")
-        return found
-
-    def number(self, word: str, element: Element) -> float:
-        try:
-            if not _NUMBER.fullmatch(word):
-                raise ValueError
-            if word.endswith("I"):
-                return float("-inf") if word[0] == "-" else float("inf")
-            return float(int(word, 16)) if "x" in word.lower() else float(word)
-        except (ValueError, OverflowError):
-            raise self.fail(element, f"expected a number, found {word[:40]!r}") from None
-
-
-def _words(text: str) -> list[str]:
-    return text.replace(",", " ").split()
-
-
-def _strings(text: str) -> tuple[str, ...]:
-    """The quoted strings of a list; a text without quotation marks is one string."""
-    if text.lstrip()[:1] not in ("'", '"'):
-        return (text,)
-    found: list[str] = []
-    at = 0
-    while match := _STRING.match(text, at):
-        found.append(_ESCAPE.sub(r"\1", match.group(2)))
-        at = match.end()
-    return tuple(found)
-
-
-def _guessed(text: str) -> str:
-    if text.strip().lower() in ("true", "false"):
-        return "Bool"
-    some = _words(text[:200])[:20]
-    whole = some if len(text) <= 200 else some[:-1]
-    return "Float" if whole and all(_NUMBER.fullmatch(w) for w in whole) else "String"
 
 
 def _declares(body: list[BodyItem], name: str) -> bool:

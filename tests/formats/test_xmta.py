@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from formats import read, read_face, write, xmta
 from formats.bifs.scene import BifsScene
 from formats.streams import read_stream
 from formats.vrml97.parser import parse
-from formats.vrml97.tree import Numbers, Strings, VrmlNode, definitions
+from formats.vrml97.tree import Nodes, Numbers, Strings, VrmlNode, definitions
 from formats.xml_tree import parse_xml
 from formats.xmta.printer import print_scene
 from formats.xmta.reader import read_document
@@ -88,6 +89,29 @@ def test_everything_that_a_tree_holds_reads_back() -> None:
     odd = next(n for n in found.nodes("children") if isinstance(n, VrmlNode) and n.type == "Odd")
     assert odd.get("s") == Strings(("one",), True)
     assert [n.type for n in found.nodes("children")[2].nodes("choice")] == ["Group", "Group"]  # type: ignore[union-attr]
+
+
+def test_types_and_values_by_their_names_in_xmta() -> None:
+    """Other writers name types and values as the schema of XMT-A does."""
+    root = parse_xml(
+        SCENE.format("""<ProtoDeclare name="Odd" protoID="1">
+ <field name="n" type="Integer" vrml97Hint="field" intValue="1"/>
+ <field name="at" type="Vector3Array" vrml97Hint="field" vector3ArrayValue="1 2 3"/>
+ <field name="one" type="Node" vrml97Hint="exposedField"><node>NULL</node></field>
+ <field name="all" type="Nodes" vrml97Hint="exposedField"><nodes></nodes></field></ProtoDeclare>
+ <ProtoInstance name="Odd"><fieldValue name="at" vector3ArrayValue="4 5 6"/></ProtoInstance>""").encode()
+    )
+    proto, node = read_document(root, "x").statements
+    wanted = parse("PROTO Odd [ field SFInt32 n 1 field MFVec3f at [ 1 2 3 ] exposedField SFNode one NULL ] { }")[0]
+    assert proto.interface[:3] == wanted.interface  # type: ignore[union-attr]
+    assert proto.interface[3].value == Nodes((), True)  # type: ignore[union-attr]
+    assert node.get("at") == Numbers(np.array([4.0, 5.0, 6.0]), True)  # type: ignore[union-attr]
+
+
+def test_fields_of_nodes_always_have_their_element() -> None:
+    """MP4Box does not read what follows a field of nodes that is declared without one."""
+    scene = BifsScene(parse("PROTO Odd [ exposedField SFNode a NULL exposedField MFNode b [ ] ] { Group { } }"))
+    assert re.findall(r"<nodes?>", print_scene(scene)) == ["<node>", "<nodes>"]
 
 
 def test_the_same_face_as_bt(tmp_path: Path) -> None:
