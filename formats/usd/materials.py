@@ -1,18 +1,20 @@
-"""Materials as UsdPreviewSurface networks, and back."""
+"""Materials as UsdPreviewSurface networks, and back. USD's colours are linear light, a `Material`'s are sRGB."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-from pxr import Ar, Gf, Sdf, Tf, Usd, UsdShade
+from pxr import Ar, Gf, Sdf, Usd, UsdShade
 
 from fba.mesh import Material
+from fba.shading import TextureMap
+from formats.gltf.colors import from_linear, to_linear
 from formats.usd.names import Namer, name_of, put_name
 from formats.usd.properties import get, put, put_string
+from formats.usd.surfaces import keep_shading, kept_shading, write_shading, write_texture
 
 Color = tuple[float, float, float]
-UV_PRIMVAR = "st"
 _DEFAULT_ROUGHNESS = 0.5
 _DEFAULT_DIFFUSE: Color = (0.18, 0.18, 0.18)
 """UsdPreviewSurface's own values for inputs that are not authored."""
@@ -46,13 +48,20 @@ class MaterialLibrary:
         surface = UsdShade.Shader.Define(self._stage, path.AppendChild("Surface"))
         surface.CreateIdAttr("UsdPreviewSurface")
         for name, color in _colors(material).items():
-            surface.CreateInput(name, Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*color))
+            surface.CreateInput(name, Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*to_linear(color)))
         for name, number in _numbers(material).items():
             surface.CreateInput(name, Sdf.ValueTypeNames.Float).Set(number)
-        surface.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(1)
+        shading = material.shading
+        surface.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(1 if shading is None else 0)
         prim.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
         if material.texture:
-            _write_texture(self._stage, path, surface, material.texture)
+            lay = (shading.base if shading else None) or TextureMap(material.texture)
+            outputs = [("rgb", surface.GetInput("diffuseColor"))]
+            if shading is not None and shading.alpha_mode in ("mask", "blend"):
+                outputs.append(("a", surface.GetInput("opacity")))
+            write_texture(self._stage, path, "Texture", lay, outputs)
+        if shading is not None:
+            write_shading(self._stage, path, surface, shading)
         _write_exact(prim.GetPrim(), material)
         return path
 
@@ -69,26 +78,6 @@ def _numbers(material: Material) -> dict[str, float]:
     return {"roughness": 1.0 - material.shininess, "opacity": 1.0 - material.transparency}
 
 
-def _write_texture(stage: Usd.Stage, path: Sdf.Path, surface: UsdShade.Shader, texture: str) -> None:
-    try:
-        asset = Sdf.AssetPath(texture)
-    except Tf.ErrorException:
-        # Control characters have no place in an asset path; the name stays in the own attribute.
-        return
-    reader = UsdShade.Shader.Define(stage, path.AppendChild("TextureCoordinates"))
-    reader.CreateIdAttr("UsdPrimvarReader_float2")
-    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set(UV_PRIMVAR)
-    uv = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
-    image = UsdShade.Shader.Define(stage, path.AppendChild("Texture"))
-    image.CreateIdAttr("UsdUVTexture")
-    image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(asset)
-    for side in ("wrapS", "wrapT"):
-        image.CreateInput(side, Sdf.ValueTypeNames.Token).Set("repeat")
-    image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(uv)
-    color = image.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
-    surface.GetInput("diffuseColor").ConnectToSource(color)
-
-
 def _write_exact(prim: Usd.Prim, material: Material) -> None:
     for name, color in _colors(material).items():
         put(prim, name, Sdf.ValueTypeNames.Double3, Gf.Vec3d(*color))
@@ -96,6 +85,7 @@ def _write_exact(prim: Usd.Prim, material: Material) -> None:
         put(prim, name, Sdf.ValueTypeNames.Double, getattr(material, name))
     if material.texture is not None:
         put_string(prim, "texture", material.texture)
+    keep_shading(prim, material)
 
 
 def read_material(prim: Usd.Prim) -> Material:
@@ -108,8 +98,12 @@ def read_material(prim: Usd.Prim) -> Material:
     ambient = get(prim, "ambient_intensity")
     if ambient is not None:
         material = replace(material, ambient_intensity=float(ambient))
+    shading = kept_shading(prim, _input(shader, "metallic"), _input(shader, "roughness"))
+    if shading is not None and shading.base is not None:
+        shading = replace(shading, base=replace(shading.base, image=material.texture or shading.base.image))
     return replace(
         material,
+        shading=shading,
         shininess=_number(prim, shader, "roughness", "shininess", _DEFAULT_ROUGHNESS),
         transparency=_number(prim, shader, "opacity", "transparency", 1.0),
     )
@@ -129,11 +123,10 @@ def _color(prim: Usd.Prim, shader: UsdShade.Shader | None, name: str, default: C
     found = _input(shader, name)
     single = np.array(default if found is None else found, dtype=np.float32)
     exact = get(prim, name)
-    values = np.array(exact) if exact is not None else single
-    if not np.array_equal(values.astype(np.float32), single):
-        values = single
-    red, green, blue = (float(v) for v in values)
-    return red, green, blue
+    if exact is not None and np.array_equal(np.array(to_linear(exact), dtype=np.float32), single):
+        red, green, blue = (float(value) for value in exact)
+        return red, green, blue
+    return from_linear(float(value) for value in single)
 
 
 def _number(prim: Usd.Prim, shader: UsdShade.Shader | None, name: str, own: str, default: float) -> float:

@@ -15,7 +15,7 @@ from fba.mesh import Material, PolyMesh
 from fba.scene import Role, Shape
 from formats.normals import SmoothNormals
 from formats.usd.axes import StageAxes
-from formats.usd.materials import UV_PRIMVAR, MaterialLibrary, read_material
+from formats.usd.materials import MaterialLibrary, read_material
 from formats.usd.names import Namer
 from formats.usd.properties import (
     get,
@@ -30,6 +30,7 @@ from formats.usd.properties import (
     to_single,
     vt,
 )
+from formats.usd.surfaces import UV_PRIMVAR
 from formats.usd.xforms import value_of
 
 MATERIAL_FAMILY = "materialBind"

@@ -8,6 +8,7 @@ import struct
 import tempfile
 import zipfile
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pxr import Sdf, UsdUtils
@@ -102,11 +103,16 @@ def check_references(found: Mapping[str, bytes], path: Path) -> None:
                 raise InputFileError(f"{path}: {name} refers to '{wanted}', which is not in the package")
 
 
-def package_of(layer: Sdf.Layer, stem: str, scene: FaceScene) -> bytes:
-    """A package of a stage; asset paths in `layer` become those inside the package.
+@dataclass(frozen=True, eq=False)
+class Packed:
+    """A scene whose materials name the images as they lie in a package, and these images."""
 
-    Images that cannot be had or opened are left out, with the texture that names them.
-    """
+    scene: FaceScene
+    images: dict[str, bytes]
+
+
+def packed_images(scene: FaceScene) -> Packed:
+    """Choose the images of a package and their names. Those that cannot be had or opened are left out."""
     names: dict[str, str] = {}
     content: dict[str, bytes] = {}
     for texture in texture_names(scene):
@@ -114,11 +120,17 @@ def package_of(layer: Sdf.Layer, stem: str, scene: FaceScene) -> bytes:
         if image is not None:
             names[texture] = _free_name(texture, image[1], content)
             content[names[texture]] = image[0]
-    UsdUtils.ModifyAssetPaths(layer, lambda asset: names.get(asset, ""))
+    shapes = {s.name: replace(s, materials=tuple(m.renamed(names) for m in s.materials)) for s in scene.shapes}
+    return Packed(scene.map_shapes(shapes), content)
+
+
+def package_of(layer: Sdf.Layer, stem: str, images: Mapping[str, bytes]) -> bytes:
+    """A package of a stage and its images. Where the layer names others, their paths are taken out of it."""
+    UsdUtils.ModifyAssetPaths(layer, lambda asset: asset if asset in images else "")
     with tempfile.TemporaryDirectory() as folder:
         stage = Path(folder) / "stage.usdc"
         layer.Export(str(stage), args={"format": "usdc"})
-        files = {f"{stem}.usdc": stage.read_bytes(), **content}
+        files = {f"{stem}.usdc": stage.read_bytes(), **images}
     return _zip(files)
 
 

@@ -19,14 +19,15 @@ from formats.usd.animation import motion_of
 from formats.usd.blend_shapes import NORMAL_PLACES, rounded
 from formats.usd.joints import Rig
 from formats.usd.properties import put, to_single
-from formats.usd.stages import quiet, save_layer
+from formats.usd.stages import placed, quiet, save_layer
 from formats.usd.writer import finish, start
 
 
 def write_portable_usd(face: AnimatableFace, path: Path, stream: FapStream | None) -> None:
     """Write a face as one-sided blend shapes and joints; see `formats.usd.write_portable`."""
     motion = None if stream is None else motion_of(face, stream)
-    flat = flat_face(face)
+    packed = placed(face.scene, path)
+    flat = flat_face(replace(face, scene=packed.scene))
     with quiet():
         draft = start(flat.scene, "SkelRoot", Rig(face.scene, face.tables))
         split = one_sided(flat, draft.normals, None if motion is None else motion.values)
@@ -44,7 +45,7 @@ def write_portable_usd(face: AnimatableFace, path: Path, stream: FapStream | Non
                     weights[entry.name] = entry.weight(motion.values[:, entry.table])
             targets.append(own)
         finish(draft, targets, motion, weights)
-    save_layer(draft.layer, path, flat.scene)
+    save_layer(draft.layer, path, packed.images)
 
 
 def flat_face(face: AnimatableFace) -> AnimatableFace:

@@ -22,6 +22,7 @@ from formats.usd.meshes import read_mesh
 from formats.usd.names import CHILDREN, name_of
 from formats.usd.properties import PREFIX, get, need, target, targets
 from formats.usd.stages import open_stage, reading
+from formats.usd.vertex_attributes import read_vertex_attributes
 from formats.usd.writer import FORMAT
 from formats.usd.xforms import read_placement
 
@@ -92,7 +93,8 @@ def read_stage(
         raise InputFileError(f"{path} has no mesh; a face needs UsdGeomMesh prims with polygons")
     scene = replace(scene, images=_images(scene, packed))
     if root is not None:
-        return scene, axes, {shape.name: prim for shape, prim in zip(scene.shapes, walk.meshes, strict=True)}
+        prims = {shape.name: prim for shape, prim in zip(scene.shapes, walk.meshes, strict=True)}
+        return replace(scene, vertex_attributes=read_vertex_attributes(scene, prims)), axes, prims
     scene = _with_unique_names(scene)
     return scene, axes, {shape.name: prim for shape, prim in zip(scene.shapes, walk.meshes, strict=True)}
 

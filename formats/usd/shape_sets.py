@@ -15,7 +15,7 @@ from formats.matrices import into_shape
 from formats.usd.names import Namer, name_of
 from formats.usd.properties import get, ints, put, put_string, rows, to_single
 from formats.usd.reader import own_root, read_stage
-from formats.usd.stages import open_stage, quiet, reading, save_layer
+from formats.usd.stages import open_stage, placed, quiet, reading, save_layer
 from formats.usd.writer import finish, start
 
 
@@ -24,8 +24,9 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
     if len(shapes.neutral) != scene.vertex_count:
         raise MeshError(f"shapes over {len(shapes.neutral)} vertices do not fit a scene of {scene.vertex_count}")
     places = scene.file_order()
+    packed = placed(scene, path)
     with quiet():
-        draft = start(scene, "SkelRoot")
+        draft = start(packed.scene, "SkelRoot")
         put(draft.root, "shapeNames", Sdf.ValueTypeNames.StringArray, list(shapes.names))
         # An animation knows shapes by their tokens, so one expression has the same token on every mesh.
         namer = Namer()
@@ -42,7 +43,7 @@ def write_shapes(scene: FaceScene, shapes: ShapeSet, path: Path) -> None:
                     put_string(own.add(token, index, offsets, own.turned(index, offsets)).GetPrim(), "name", name)
             targets.append(own)
         finish(draft, targets)
-    save_layer(draft.layer, path, scene)
+    save_layer(draft.layer, path, packed.images)
 
 
 def read_shapes(path: Path) -> ShapeSet | None:

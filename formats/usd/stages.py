@@ -77,14 +77,19 @@ def open_stage(path: Path) -> tuple[Usd.Stage, Mapping[str, bytes]]:
     return stage, packed
 
 
-def save_layer(layer: Sdf.Layer, path: Path, scene: FaceScene) -> None:
-    """Write a layer atomically: .usda as text, .usdc and .usd as data, .usdz with the images of the scene."""
+def placed(scene: FaceScene, path: Path) -> package.Packed:
+    """The scene as it is written to a file of this name: in a package with its images, else as it is."""
+    return package.packed_images(scene) if path.suffix.lower() == ".usdz" else package.Packed(scene, {})
+
+
+def save_layer(layer: Sdf.Layer, path: Path, images: Mapping[str, bytes]) -> None:
+    """Write a layer atomically: .usda as text, .usdc and .usd as data, .usdz with these images."""
     kind = path.suffix.lower().removeprefix(".")
     kind = "usdc" if kind == "usd" else kind
     with quiet(), atomic_output(path) as temporary:
         try:
             if kind == "usdz":
-                temporary.write_bytes(package.package_of(layer, path.stem, scene))
+                temporary.write_bytes(package.package_of(layer, path.stem, images))
                 return
             done = layer.Export(str(temporary.absolute()), args={"format": kind})
         except Tf.ErrorException as error:

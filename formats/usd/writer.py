@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pxr import Gf, Kind, Sdf, Tf, Usd
+from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom
 
 from fat.build import check_indices
 from fat.face import AnimatableFace
@@ -25,7 +25,8 @@ from formats.usd.materials import MaterialLibrary
 from formats.usd.meshes import write_mesh
 from formats.usd.names import CHILDREN, Namer, node_paths, put_name
 from formats.usd.properties import put, put_string, put_targets
-from formats.usd.stages import quiet, save_layer
+from formats.usd.stages import placed, quiet, save_layer
+from formats.usd.vertex_attributes import write_vertex_attributes
 from formats.usd.xforms import write_matrix, write_transform
 
 FORMAT = "fba-usd/1"
@@ -64,14 +65,16 @@ class Draft:
 
 def write_usd(face: FaceScene | AnimatableFace, path: Path, stream: FapStream | None) -> None:
     """Write a scene, or a face with its tables as blend shapes; see `formats.usd.write`."""
+    scene = face.scene if isinstance(face, AnimatableFace) else face
+    packed = placed(scene, path)
     with quiet():
         if isinstance(face, AnimatableFace):
-            draft = start(face.scene, "SkelRoot", Rig(face.scene, face.tables))
+            draft = start(packed.scene, "SkelRoot", Rig(scene, face.tables))
             write_facts(draft.root, face, draft.paths, draft.axes)
             _write_tables(draft, face, None if stream is None else motion_of(face, stream))
         else:
-            draft = start(face, "Xform")
-    save_layer(draft.layer, path, draft.scene)
+            draft = start(packed.scene, "Xform")
+    save_layer(draft.layer, path, packed.images)
 
 
 def start(scene: FaceScene, root_type: str, rig: Rig | None = None) -> Draft:
@@ -98,6 +101,7 @@ def start(scene: FaceScene, root_type: str, rig: Rig | None = None) -> Draft:
             smooth = SmoothNormals(node.mesh) if node.mesh.normal_indices is None else None
             draft.namers[node.name] = write_mesh(stage, paths[node.name], node, axes, library, smooth)
             draft.normals[node.name] = smooth
+            write_vertex_attributes(UsdGeom.Mesh.Get(stage, paths[node.name]), scene, node.name)
             write_matrix(stage.GetPrimAtPath(paths[node.name]), gf_matrix(scene.world_matrix(node.name), axes))
         else:
             prim = stage.DefinePrim(paths[node.name], "Xform")
