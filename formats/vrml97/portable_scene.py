@@ -11,7 +11,7 @@ from formats.vrml97.tree import Booleans, Statement, Use, VrmlNode, node, number
 
 _LIGHTS = frozenset({"DirectionalLight", "PointLight", "SpotLight"})
 
-_OWN_LIGHTS = (((0.4, -0.5, -0.8), 1.0), ((-0.8, -0.1, -0.6), 0.5))
+_OWN_LIGHTS = (((0.4, -0.5, -0.8), 0.85), ((-0.8, -0.1, -0.6), 0.4))
 """Directions (inside axes) and intensities: one from above on the viewer's left, a weaker one from the right."""
 
 
