@@ -26,7 +26,7 @@ from cloning.image.points import (
 )
 from cloning.image.solve import PixelSystem
 from cloning.image.texture import without_foreign_texture
-from cloning.image.warp import Sampler, WarpMesh, label_pixels, mapped, ring_around, triangulate
+from cloning.image.warp import Sampler, WarpMesh, label_pixels, mapped, part_around, ring_around, triangulate
 from fba.arrays import Bools, Floats, Ints
 
 Method = Literal["vtc", "eri"]
@@ -144,6 +144,7 @@ class Analogy:
         fine = [refined(self._moved(points)) for points in expressions]
         self._box = self._box_of(fine)
         self._domain = self._domain_of(fine)
+        self._near = _widened(self._domain)
         self._inside = _bounds(self._domain)
         self._system: PixelSystem | None = None
 
@@ -168,7 +169,7 @@ class Analogy:
         warp = self._warp(expression.points)
         own = {n: expression.points[n] for n in self._names}
         warped, displaced = self._warped_target(warp)
-        asked = (warp.mask > 0) | self._near_domain(warp.labels)
+        asked = ((warp.mask > 0) | self._near) & (warp.labels >= 0)
         pair = self._source_pair(warp, asked, own, expression)
         steps, light = 0, relit(*pair, (warp.mask > 0.5) & (warp.skin > 0.99))
         if self.method == "eri":
@@ -186,7 +187,7 @@ class Analogy:
         changed = np.zeros(self._picture.shape[:2], bool)
         changed[rows, columns] = displaced | (warp.mask > 0)
         rgb, whole = self._picture.copy(), self._yuv[0].copy()
-        rgb[rows, columns] = np.where(changed[rows, columns, None], to_rgb(warped), rgb[rows, columns])
+        rgb[changed] = to_rgb(warped[:, changed[rows, columns]])
         whole[rows, columns] = warped[0]
         head = turned(self._source, expression.points, self._names)
         return AnalogyResult(rgb, whole, changed, dict(warp.moved), steps, shown, head, light)
@@ -237,22 +238,15 @@ class Analogy:
         """Luminance of the source's two pictures at the pixels of the warped target; zero where nothing is asked."""
         rows, columns = np.nonzero(asked)
         pair = np.zeros((2, *warp.labels.shape), np.float32)
+        still, moved = (
+            mapped(warp.mesh.affine(self._places(warp, points)), warp.labels, rows, columns, self._box)
+            for points in (self._source, own)
+        )
+        pair[0, rows, columns] = self._neutral.at(still)
         shrink = 1.0 / self._expression_scale(own)
-        samplers = (self._neutral, Sampler(luminance(expression.rgb), shrink=shrink))
-        for plane, points, sampler in zip(pair, (self._source, own), samplers, strict=True):
-            affine = warp.mesh.affine(self._places(warp, points))
-            plane[rows, columns] = sampler.at(mapped(affine, warp.labels, rows, columns, self._box))
+        rgb, moved = part_around(expression.rgb, moved, shrink)
+        pair[1, rows, columns] = Sampler(luminance(rgb), shrink=shrink).at(moved)
         return pair[0], pair[1]
-
-    def _near_domain(self, labels: Ints) -> Bools:
-        """The domain and its neighbours, as far as triangles reach."""
-        wide = self._domain.copy()
-        wide[1:] |= self._domain[:-1]
-        wide[:-1] |= self._domain[1:]
-        wide[:, 1:] |= self._domain[:, :-1]
-        wide[:, :-1] |= self._domain[:, 1:]
-        near: Bools = wide & (labels >= 0)
-        return near
 
     def _expression_scale(self, own: Places) -> float:
         return source_to_target(own, self._target, self._names).scale
@@ -287,10 +281,13 @@ class Analogy:
         """Put the source's pixels between the lips, and say where."""
         share = slit_mask(warp.mesh, warp.labels, warp.moved, MOUTH) * (warp.labels >= 0)
         rows, columns = np.nonzero(share)
+        if not len(rows):
+            return share > 0
         places = mapped(warp.mesh.affine(self._places(warp, own)), warp.labels, rows, columns, self._box)
         shrink = 1.0 / self._expression_scale(own)
         share_here = share[rows, columns]
-        for k, plane in enumerate(to_yuv(expression.rgb)):
+        rgb, places = part_around(expression.rgb, places, shrink)
+        for k, plane in enumerate(to_yuv(rgb)):
             inside = np.zeros(len(rows), np.float32) if k and self._grey else Sampler(plane, 1, shrink).at(places)
             warped[k, rows, columns] += share_here * (inside - warped[k, rows, columns])
         return share > 0
@@ -303,3 +300,13 @@ def _bounds(domain: Bools) -> tuple[slice, slice]:
         at = np.flatnonzero(domain.any(axis=axis))
         found.append(slice(int(at[0]) - 2, int(at[-1]) + 3))
     return found[0], found[1]
+
+
+def _widened(domain: Bools) -> Bools:
+    """A domain and its neighbours."""
+    wide = domain.copy()
+    wide[1:] |= domain[:-1]
+    wide[:-1] |= domain[1:]
+    wide[:, 1:] |= domain[:, :-1]
+    wide[:, :-1] |= domain[:, 1:]
+    return wide

@@ -39,10 +39,10 @@ def luminance(rgb: UInt8) -> Planes:
 
 
 def to_rgb(yuv: Planes) -> UInt8:
-    """(3, h, w) planes to (h, w, 3) uint8 colours, rounded; what no screen can show is clipped channel by channel."""
-    rgb = np.moveaxis(np.tensordot(RGB_FROM_YUV, yuv, axes=(1, 0)), 0, 2)
-    out: UInt8 = np.clip(np.rint(rgb), 0, 255).astype(np.uint8)
-    return out
+    """(3, ...) planes to (..., 3) uint8 colours, rounded; what no screen can show is clipped channel by channel."""
+    rgb = RGB_FROM_YUV.astype(yuv.dtype) @ yuv.reshape(3, -1)
+    np.clip(np.rint(rgb, out=rgb), 0.0, 255.0, out=rgb)
+    return np.ascontiguousarray(rgb.astype(np.uint8).T).reshape(*yuv.shape[1:], 3)
 
 
 def relit(one: Planes, other: Planes, skin: Bools) -> float:
