@@ -35,7 +35,7 @@ def read_shapes(path: Path, neutral: FaceScene) -> ShapeSet:
     ----------
     path : a folder of OBJ files (or MakeHuman .target files), one for each target, named after it; an .npz with
         names (K,), deltas (K, N, 3) and optionally neutral (N, 3); a .glb or .gltf with morph targets; a .usda,
-        .usdc or .usd with blend shapes; a .wfm with Candide-3's animation units.
+        .usdc, .usd or .usdz with blend shapes; a .wfm with Candide-3's animation units.
     neutral : the face that they belong to, N vertices.
 
     Raises
@@ -54,7 +54,7 @@ def read_shapes(path: Path, neutral: FaceScene) -> ShapeSet:
         found = _read_archive(path, len(base))
     elif name.endswith((".glb", ".gltf")):
         found = _read_gltf(path, len(base))
-    elif name.endswith((".usda", ".usdc", ".usd")):
+    elif name.endswith((".usda", ".usdc", ".usd", ".usdz")):
         found = _read_usd(path, len(base))
     elif name.endswith(".wfm"):
         found = read_animation_units(path, len(base))

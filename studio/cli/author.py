@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 NeutralPath = Annotated[Path, typer.Argument(help="The neutral face; a glTF or USD may hold the shapes as well.")]
 Out = Annotated[Path, typer.Option("--output", "-o", help="Where to write; the extension chooses the format.")]
 
-WITH_SHAPES = (".glb", ".gltf", ".usda", ".usdc", ".usd")
+WITH_SHAPES = (".glb", ".gltf", ".usda", ".usdc", ".usd", ".usdz")
 
 
 def author(

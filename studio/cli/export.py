@@ -31,7 +31,7 @@ def export(
     open_jaw: OpenJaw = None,
     stream: Annotated[
         Path | None,
-        typer.Option(help="A .fap stream that becomes the animation of OUT; 'demo' names the shipped one."),
+        typer.Option(help="A stream of any kind that becomes the animation of OUT; 'demo' names the shipped one."),
     ] = None,
 ) -> None:
     """Write a face in another format; its tables go along where the format can carry them."""
@@ -56,12 +56,12 @@ def export(
 
 def _export_face(face: Path, output: Path, open_jaw: Mode | None, stream: Path | None, *, portable: bool) -> None:
     from fat.face import AnimatableFace
+    from fat.open_jaw import open_jaw_mode
     from formats import format_of, read, write
-    from formats.fap import read_fap
     from studio.cli.console import console, print_findings
     from studio.inputs import left_behind, scene_of
     from studio.jaw_mode import with_open_jaw
-    from studio.streams import shipped
+    from studio.streams import open_stream
 
     entry = format_of(output, writing=True)
     found = read(str(face))
@@ -73,8 +73,9 @@ def _export_face(face: Path, output: Path, open_jaw: Mode | None, stream: Path |
         usage(f"--open-jaw: {face} is a plain mesh without open_jaw")
     frames = None
     if stream is not None:
-        frames, remarks = read_fap(shipped(stream))
-        said += remarks
+        strict = isinstance(found, AnimatableFace) and open_jaw_mode(found) == "strict"
+        frames, remarks = open_stream(stream, strict_jaw=strict)
+        said = [*said, *remarks]
     write(found, output, frames, portable=portable)
     out = console()
     print_findings([*said, *left_behind(scene_of(found), face, output)], out)
@@ -97,15 +98,17 @@ def _export_profile(face: Path, output: Path, profile: Profile) -> None:
     from studio.inputs import left_behind
 
     kind = output.suffix.lower()
-    scenes = {".usd": usd, ".usda": usd, ".usdc": usd, ".glb": gltf, ".gltf": gltf}
+    scenes = {".usd": usd, ".usda": usd, ".usdc": usd, ".usdz": usd, ".glb": gltf, ".gltf": gltf}
     if kind not in (*scenes, ".npz", "") and not output.is_dir():
-        usage(f"{output}: shapes are written to .npz, .usda, .usdc, .glb, .gltf, or a folder of OBJ (no extension)")
+        usage(
+            f"{output}: shapes are written to .npz, .usda, .usdc, .usdz, .glb, .gltf, or a folder of OBJ (no extension)"
+        )
     require_folder(output)
     found = read_face(str(face))
     _refuse_broken(found, face)
     shut, said = _shut(found) if profile == "arkit" else (None, [])
     shapes, findings = profile_shapes(found, profile, shut)
-    beside = scenes.get(kind) is not gltf and kind != ".npz"
+    beside = scenes.get(kind) is not gltf and kind not in (".npz", ".usdz")
     placed = place_textures(found.scene, output if kind not in scenes else output.parent) if beside else None
     scene = found.scene if placed is None else placed.scene
     if kind in scenes:
