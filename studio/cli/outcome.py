@@ -68,13 +68,18 @@ def _drop_output() -> None:
         return
 
 
+def _plain(message: str) -> str:
+    """A message as one line: what it quotes of a file must not steer the terminal."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in message.replace("\n", " "))
+
+
 def fail(message: str) -> None:
     """Print one message on stderr and end with BAD_INPUT."""
-    print(f"fba: error: {message}", file=sys.stderr)
+    print(f"fba: error: {_plain(message)}", file=sys.stderr)
     raise typer.Exit(Outcome.BAD_INPUT)
 
 
 def usage(message: str) -> None:
     """Print one message on stderr and end with USAGE."""
-    print(f"fba: usage: {message}", file=sys.stderr)
+    print(f"fba: usage: {_plain(message)}", file=sys.stderr)
     raise typer.Exit(Outcome.USAGE)
