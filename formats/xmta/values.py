@@ -10,13 +10,15 @@ from fba.arrays import Floats
 from fba.errors import InputFileError
 from formats.vrml97.numbers import read_decimals
 from formats.vrml97.tree import Booleans, Empty, Nodes, Numbers, Strings, Value
-from formats.xml_tree import Element
+from formats.xml_tree import MAX_ITEMS, Element
 
 _CHUNK = 1 << 21
 """Characters of numbers that are converted at once: bounds the memory."""
 
-_STRING = re.compile(r"""[\s,]*(["'])((?:[^\\]|\\.)*?)\1(?=\s|\Z)""", re.DOTALL)
-"""A quoted string. Its end is a quotation mark before white space: some writers leave the marks inside unescaped."""
+_OPENING = re.compile(r"""[\s,]*(["'])""")
+_MARKS = {mark: re.compile(rf"\\.|{mark}(?=\s|\Z)", re.DOTALL) for mark in "\"'"}
+"""Escapes and ends of a quoted string. The end is a mark before white space: some writers leave marks inside as they
+are."""
 
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
 _NUMBER = re.compile(r"[+-]?(?:0[xX][0-9a-fA-F]+|[0-9.]+(?:[eE][+-]?[0-9]+)?|I)")
@@ -42,7 +44,7 @@ class ValueReader:
                 return Strings(_strings(text), True)
             return Strings((text,))
         if base == "Bool":
-            words = text.lower().split()
+            words = text[:MAX_ITEMS].lower().split()
             if not words or any(w not in ("true", "false", "1", "0") for w in words):
                 raise self.fail(element, f"expected true or false, found {text[:40]!r}")
             return Booleans(tuple(w in ("true", "1") for w in words), many)
@@ -83,14 +85,18 @@ def _words(text: str) -> list[str]:
 
 
 def _strings(text: str) -> tuple[str, ...]:
-    """The quoted strings of a list; a text without quotation marks is one string."""
+    """The quoted strings of a list; a text without quotation marks is one string. What is not closed is left out."""
     if text.lstrip()[:1] not in ("'", '"'):
         return (text,)
     found: list[str] = []
     at = 0
-    while match := _STRING.match(text, at):
-        found.append(_ESCAPE.sub(r"\1", match.group(2)))
-        at = match.end()
+    while opening := _OPENING.match(text, at):
+        marks = _MARKS[opening.group(1)].finditer(text, opening.end())
+        end = next((m.start() for m in marks if not m.group().startswith("\\")), None)
+        if end is None or len(found) == MAX_ITEMS:
+            break
+        found.append(_ESCAPE.sub(r"\1", text[opening.end() : end]))
+        at = end + 1
     return tuple(found)
 
 

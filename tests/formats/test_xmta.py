@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from formats.bifs.scene import BifsScene
 from formats.streams import read_stream
 from formats.vrml97.parser import parse
 from formats.vrml97.tree import Nodes, Numbers, Strings, VrmlNode, definitions
-from formats.xml_tree import parse_xml
+from formats.xml_tree import attribute, parse_xml
 from formats.xmta.printer import print_scene
 from formats.xmta.reader import read_document
 
@@ -275,3 +276,13 @@ def test_large_lists_are_read_exactly() -> None:
     found = read_document(parse_xml(print_scene(scene).encode()), "x").statements[0]
     assert isinstance(found, VrmlNode)
     assert found.get("point") == Numbers(values, True)
+
+
+@pytest.mark.parametrize("inside", ['\\"', '"', "a", "\\", '"x" '])
+def test_long_strings_take_little_memory(inside: str) -> None:
+    text = attribute("info", '"' + inside * 40_000)
+    tracemalloc.start()
+    read_document(parse_xml(SCENE.format(f"<WorldInfo{text}/>").encode()), "x")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 20e6
