@@ -197,7 +197,7 @@ def test_meshes_of_one_table_share_what_weight_one_means(tmp_path: Path) -> None
     stream = FapStream.build(25, 5, {3: np.array([-700, 200, 512, 900, 1300])})
     path = tmp_path / "face.usdc"
     write(face, path, stream)
-    assert validate_stage(path) == [] or all(f.severity != "error" for f in validate_stage(path))
+    assert not [f for f in validate_stage(path) if f.severity == "error"]
     for pose, found in zip(Player(face).frames(stream), played(path, range(5)), strict=True):
         for shape, vertices in pose.world_shapes().items():
             np.testing.assert_allclose(found[shape], vertices, rtol=0, atol=5e-6 * np.abs(vertices).max())
@@ -206,12 +206,17 @@ def test_meshes_of_one_table_share_what_weight_one_means(tmp_path: Path) -> None
     assert all(np.array_equal(a.displacements, b.displacements) for a, b in zip(again.meshes, meshes, strict=True))
 
 
+@pytest.fixture(scope="module")
+def shipped() -> AnimatableFace:
+    return read_face("default")
+
+
 @pytest.mark.parametrize("portable", [False, True], ids=["native", "portable"])
-def test_openusd_plays_the_shipped_face(portable: bool, tmp_path: Path) -> None:
-    face, (stream, _) = read_face("default"), read_fap(sample("streams/demo.fap"))
+def test_openusd_plays_the_shipped_face(portable: bool, shipped: AnimatableFace, tmp_path: Path) -> None:
+    face, (stream, _) = shipped, read_fap(sample("streams/demo.fap"))
     path = tmp_path / "face.usdc"
     write(face, path, stream, portable=portable)
-    frames = [12, 36, 60, 84]
+    frames = [36, 60, 84]
     poses = list(Player(face).frames(stream))
     unit = smallest_unit(face)
     for frame, found in zip(frames, played(path, frames), strict=True):
