@@ -23,7 +23,7 @@ from formats.files import read_bytes, write_bytes
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _BLANKS = re.compile(r"[ \t\f\v]+")
-_HEADER = re.compile(r"(\S+)[ \t\f\v]+(?:(.*?)[ \t\f\v]+)?(\S+)[ \t\f\v]+(\S+)")
+_WORD = re.compile(r"[^ \t\f\v]+")
 _NUMBERS = re.compile(r"[0-9eE.+\- \t\f\v]*")
 _INT32 = 2**31
 
@@ -152,12 +152,14 @@ class _Reader:
                 yield number, stripped
 
     def _header(self, line: _Line) -> tuple[str, str, float, int]:
-        match = _HEADER.fullmatch(line[1])
+        words = [w.span() for w in _WORD.finditer(line[1])]
         try:
-            if match is None:
+            if len(words) < 3:
                 raise ValueError
-            version, name, rate, count = match[1], match[2] or "stream", *map(_number, match.group(3, 4))
+            version = line[1][slice(*words[0])]
+            name = line[1][words[0][1] : words[-2][0]].strip(" \t\f\v") or "stream"
             _number(version)
+            rate, count = (_number(line[1][slice(*words[k])]) for k in (-2, -1))
         except ValueError:
             where = f"{self.source}, line {line[0]}" if line[0] else self.source
             raise FapStreamError(

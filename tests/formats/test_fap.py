@@ -242,3 +242,13 @@ def test_a_path_may_be_plain_text(tmp_path: Path) -> None:
     path = str(tmp_path / "s.fap")
     write_fap(FapStream.build(25.0, 1, {3: [7]}), path)
     assert read_fap(path)[0].values[0, 2] == 7
+
+
+def test_blanks_without_end_are_read_in_one_go() -> None:
+    """Where the name ends was once tried at every blank, again and again."""
+    blanks = "\f" * 100_000
+    with pytest.raises(FapStreamError, match=r"a \.fap file starts with"):
+        parse_fap(f"2.1{blanks}25 x 3 {blanks} y\n".encode())
+    head = f"2.1{blanks}a  b{blanks}25{blanks}1\n"
+    stream, _ = parse_fap((head + " ".join("0" * 68) + "\n0\n").encode())
+    assert (stream.name, stream.frame_rate, stream.version) == ("a  b", 25.0, "2.1")
