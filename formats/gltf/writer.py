@@ -18,6 +18,7 @@ from fba.scene import FaceScene, Shape
 from fba.stream import FapStream
 from formats.files import atomic_output, write_bytes
 from formats.gltf.buffers import Buffer, Json, to_single
+from formats.gltf.jaw import add_jaw, jaw_motion, lower_teeth
 from formats.gltf.materials import Materials
 from formats.gltf.nodes import PATHS, Nodes
 from formats.gltf.own import FORMAT, KEY, Pack, face_json, scene_json
@@ -48,6 +49,8 @@ class Draft:
         self.nodes = nodes.of
         self._nodes = nodes.entries
         self._animations: list[Json] = []
+        self._teeth: Shape | None = None
+        self._jaw = ""
         self.own: Json = {"format": FORMAT, "scene": scene_json(scene, self._pack)}
 
     def _mesh(self, shape: Shape) -> int | None:
@@ -60,21 +63,26 @@ class Draft:
         return len(self._meshes) - 1
 
     def add_face(self, face: AnimatableFace) -> None:
-        """Keep all that a face is."""
+        """Keep all that a face is; give it a node for its jaw."""
         self.own |= face_json(face, self._pack, self.nodes)
+        self._teeth = lower_teeth(face.scene)
+        if self._teeth is not None:
+            self._jaw = add_jaw(self._nodes, self.nodes, self._teeth)
 
     def animate(self, face: AnimatableFace, stream: FapStream) -> None:
         """Play a stream: weights of the morph targets and fields of the nodes, at the time of every frame."""
         if not len(stream):
             raise FapStreamError(f"the stream '{stream.name}' has no frames")
         values = Player(face).table_values(stream)
-        times = (stream.frame_numbers - stream.frame_numbers[0]) / stream.frame_rate
         borders = {number: table_borders(table) for number, table in enumerate(face.tables)}
         channels: list[tuple[str, str, Floats]] = []
         for shape, targets in self._targets.items():
             weights = target_weights(targets, borders, values)
             if weights.any() and "mesh" in self._nodes[self.nodes[shape]]:
                 channels.append((shape, "weights", weights.ravel()))
+            if weights.any() and self._teeth is not None and shape == self._teeth.name:
+                moves, turns = jaw_motion(self._teeth, targets, weights)
+                channels += [(self._jaw, "translation", moves), (self._jaw, "rotation", _continuous(turns))]
         for (node, field), keys in driven_fields(face.scene, face.tables, values).items():
             channels.append((node, PATHS[field], _continuous(keys) if keys.shape[1] == 4 else keys))
         if channels:

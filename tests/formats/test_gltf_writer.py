@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from fat import AnimatableFace, FaceDefMesh, FaceDefTable, FaceDefTables, Player
 from fat.intervals import interval_weights
-from fba import FaceScene, Frame, Material, PolyMesh, Shape, Transform
+from fba import FaceScene, Frame, Material, PolyMesh, Role, Shape, Transform
 from fba.errors import FapStreamError, FbaError, InputFileError, MeshError, UnsupportedFeatureError
 from fba.scene import rotation_matrix, translation_matrix
 from fba.shapes import ShapeSet
@@ -202,6 +202,32 @@ def test_a_face_in_any_axes_reads_back_exactly(axes: object, name: str, tmp_path
     assert sorted(p.name for p in tmp_path.iterdir()) == expected
 
 
+def test_a_node_goes_with_the_lower_teeth(tmp_path: Path) -> None:
+    face = read_face("default")
+    face = replace(face, tables=FaceDefTables(tuple(t for t in face.tables if t.fap_id in (3, 14, 15))))
+    stream = FapStream.build(10.0, 3, {3: [0, 300, 900], 14: [0, 200, 0], 15: [0, 0, -300]})
+    write(face, tmp_path / "a.glb", stream)
+    document, _ = parts(tmp_path / "a.glb")
+    number = next(k for k, node in enumerate(document["nodes"]) if node["name"] == "jaw")
+    data = GltfData(tmp_path / "a.glb")
+    (animation,) = document["animations"]
+    keys = {}
+    for channel in animation["channels"]:
+        if channel["target"]["node"] == number:
+            kind = {"translation": "VEC3", "rotation": "VEC4"}[channel["target"]["path"]]
+            output = animation["samplers"][channel["sampler"]]["output"]
+            keys[channel["target"]["path"]] = data.accessor(output, kind)
+    (teeth,) = face.scene.with_role(Role.LOWER_TEETH)
+    rest = teeth.mesh.vertices
+    assert np.allclose(document["nodes"][number]["translation"], rest.mean(axis=0))
+    for frame, pose in enumerate(Player(face).frames(stream)):
+        x, y, z, w = keys["rotation"][frame]
+        turn = rotation_matrix((x, y, z, 2 * np.arctan2(np.linalg.norm([x, y, z]), w)))[:3, :3]
+        placed = (rest - rest.mean(axis=0)) @ turn.T + keys["translation"][frame]
+        assert np.abs(placed - pose.local[teeth.name]).max() < 0.02 * face.fapu.mns0
+    assert np.ptp(keys["translation"][:, 1]) > 0.2 * face.fapu.mns0
+
+
 def test_a_plain_scene_keeps_its_polygons(tmp_path: Path) -> None:
     write(small_scene(), tmp_path / "a.glb")
     found = read(tmp_path / "a.glb")
@@ -223,7 +249,8 @@ def test_a_stream_becomes_an_animation(tmp_path: Path) -> None:
         target = channel["target"]
         keys[document["nodes"][target["node"]]["name"], target["path"]] = sampler["output"]
         assert np.allclose(data.accessor(sampler["input"], "SCALAR").ravel(), [0.0, 0.1, 0.3])
-    assert set(keys) == {("skin", "weights"), ("teeth", "weights"), ("eye_left_yaw", "rotation")}
+    jaw = {("jaw", "translation"), ("jaw", "rotation")}
+    assert set(keys) == {("skin", "weights"), ("teeth", "weights"), ("eye_left_yaw", "rotation")} | jaw
     weights = data.accessor(keys["teeth", "weights"], "SCALAR").reshape(3, -1)
     names = document["meshes"][-1]["extras"]["targetNames"]
     jaw = weights[:, [names.index(f"fap_03_open_jaw_{b}") for b in (400, 1080)]]
