@@ -64,7 +64,7 @@ def open_page(module: str, folder: Path, query: str = "") -> dict[str, Any]:
         [chromium, *flags, address], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
     try:
-        assert done.wait(90), "the page in Chromium gave no result within 90 s"
+        assert done.wait(180), "the page in Chromium gave no result within 180 s"
     finally:
         browser.terminate()
         browser.wait(20)

@@ -40,6 +40,9 @@ from formats.x3d.displacers import BorderOffsets, border_offsets
 HUMANOID = "fba_humanoid"
 """DEF name of the HAnimHumanoid; its one root joint holds the scene."""
 
+_PASSED = (-(2.0**20), -(2.0**11), 0.0, 2.0**11, 2.0**20)
+"""Keys of an interpolator that gives what it gets: near to 0 to a ten-thousandth of a FAP unit also in float32."""
+
 _BEYOND = 10.0
 """Interpolators go on beyond the last borders as far as this many times their range."""
 
@@ -123,11 +126,10 @@ def _segment(item: VrmlNode, tables: _Tables) -> VrmlNode:
 
 @dataclass(frozen=True)
 class _Place:
-    """A table on its way into the file: its number, what drives it, its unit."""
+    """A table on its way into the file: the DEF name of what takes its value, and its unit."""
 
     table: FaceDefTable
     label: str
-    source: str | None
     unit: float
 
 
@@ -156,10 +158,12 @@ class _Tables:
             if not 1 <= table.fap_id <= FAP_COUNT:
                 raise FaceDefTablesError(f"fapID {table.fap_id} is not one of 1..{FAP_COUNT}")
             column = values[:, number_of_table]
+            entry = node("ScalarInterpolator", label, key=numbers(_PASSED), keyValue=numbers(_PASSED))
+            self.motions.append(Motion((entry,)))
             if column.any():
-                self.motions.append(value_motion(label, times, column))
-            source = f"{label}_values" if column.any() else None
-            self._add(_Place(table, label, source, face.fapu.unit(fap(table.fap_id).unit)))
+                given = Route(f"{label}_values", "value_changed", label, "set_fraction")
+                self.motions += [value_motion(label, times, column), Motion(routes=(given,))]
+            self._add(_Place(table, label, face.fapu.unit(fap(table.fap_id).unit)))
 
     def _add(self, place: _Place) -> None:
         weights: dict[tuple[bytes, int], str] = {}
@@ -194,8 +198,7 @@ class _Tables:
         if key not in weights:
             weights[key] = self.names.give(f"{name}_weight")
             nodes = (_weight(weights[key], mesh, border),)
-            if place.source is not None:
-                routes.append(Route(place.source, "value_changed", weights[key], "set_fraction"))
+            routes.append(Route(place.label, "value_changed", weights[key], "set_fraction"))
         given = self.names.give(f"{name}_{self.def_names[mesh.shape]}")
         routes.append(Route(weights[key], "value_changed", given, "set_weight"))
         self.motions.append(Motion(nodes, tuple(routes)))
@@ -213,10 +216,8 @@ class _Tables:
         for entry in place.table.transforms:
             target = self.def_names[entry.transform]
             motion = transform_motion(self.face, entry, self.names.give(f"{place.label}_turns"), target)
-            if place.source is not None:
-                route = Route(place.source, "value_changed", motion.nodes[0].def_name or "", "set_fraction")
-                motion = Motion(motion.nodes, (route, *motion.routes))
-            self.motions.append(motion)
+            route = Route(place.label, "value_changed", motion.nodes[0].def_name or "", "set_fraction")
+            self.motions.append(Motion(motion.nodes, (route, *motion.routes)))
             row: dict[str, Any] = {"node": target, "fieldId": int(entry.field)}
             row["rotationDef"] = [*turn_axis(entry.rotation_def[:3], turn), entry.rotation_def[3]]
             row["scaleDef"] = turn_sizes(entry.scale_def, turn)

@@ -98,11 +98,13 @@ def displaced(path: Path, fractions: np.ndarray, shape: str) -> np.ndarray:
     out = np.tile(points, (len(fractions), 1, 1))
     for displacer in known[f"{shape}_segment"].nodes("displacers"):
         assert isinstance(displacer, VrmlNode)
-        chain = [known[above[displacer.def_name or ""]]]
-        if chain[0].def_name not in above:
+        chain: list[VrmlNode] = []
+        name = above[displacer.def_name or ""]
+        while name in above:
+            chain.insert(0, known[name])
+            name = above[name]
+        if name != "fba_clock":
             continue
-        chain.insert(0, known[above[chain[0].def_name or ""]])
-        assert above[chain[0].def_name or ""] == "fba_clock"
         value = fractions
         for interpolator in chain:
             value = np.interp(value, numbers(interpolator, "key"), numbers(interpolator, "keyValue"))
@@ -135,6 +137,10 @@ def test_joints_segments_and_weights_are_named(tmp_path: Path) -> None:
     ]
     assert '<HAnimDisplacer DEF="fap_05_raise_b_midlip_neg_400_skin" containerField="displacers"' in text
     assert '<ScalarInterpolator DEF="fap_03_open_jaw_1080_weight"' in text
+    table = known["fap_03_open_jaw"]
+    assert np.array_equal(numbers(table, "key"), numbers(table, "keyValue"))
+    driven = {target for source, target, _ in ROUTES.findall(text) if source == "fap_03_open_jaw"}
+    assert driven == {"fap_03_open_jaw_400_weight", "fap_03_open_jaw_1080_weight", "fap_03_open_jaw_1080_weight_2"}
     assert "fba_clock" not in text
     targets = {target for _, target, field in ROUTES.findall(text) if field == "set_rotation"}
     assert targets == {"eye_left_yaw", "eye_right_yaw", "eye_left_pitch"}

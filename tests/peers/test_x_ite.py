@@ -6,13 +6,14 @@ import base64
 import io
 import json
 import re
+import subprocess
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from browser import open_page
+from browser import open_page, program
 from faces import small_face
 from PIL import Image
 
@@ -22,6 +23,7 @@ from fba.faps import Unit, fap
 from fba.scene import FaceScene, Node, Shape
 from fba.stream import FapStream
 from formats import read_face, write
+from formats.vrml97.portable_script import SCRIPT
 
 pytestmark = pytest.mark.peer
 
@@ -153,6 +155,15 @@ async function check(scene, file) {
   const routesInFile = root.querySelectorAll("ROUTE").length;
   return { unknown, elements: named.length, routes: scene.routes.length, routesInFile };
 }
+function state(scene, job, of) {
+  const found = { points: {}, fields: {} };
+  for (const name of job.shapes) found.points[name] = points(scene, name, of[name]);
+  for (const name of job.transforms) {
+    const node = scene.getNamedNode(name);
+    found.fields[name] = { rotation: Array.from(node.rotation), translation: Array.from(node.translation) };
+  }
+  return found;
+}
 async function play(job) {
   await browser.loadURL(new X3D.MFString("/" + job.file));
   const scene = browser.currentScene, live = [], frames = [];
@@ -169,14 +180,12 @@ async function play(job) {
   await wait(100);
   for (const fraction of job.fractions) {
     for (const name of job.driven) scene.getNamedNode(name).set_fraction = fraction;
-    const frame = { picture: await picture(), points: {}, fields: {} };
-    for (const name of job.shapes) frame.points[name] = points(scene, name, of[name]);
-    for (const name of job.transforms) {
-      const node = scene.getNamedNode(name);
-      frame.fields[name] = { rotation: Array.from(node.rotation), translation: Array.from(node.translation) };
-    }
-    frames.push(frame);
+    frames.push({ picture: await picture(), ...state(scene, job, of) });
   }
+  for (const name of job.driven) scene.getNamedNode(name).set_fraction = 0;
+  await picture();
+  for (const [name, value] of Object.entries(job.byHand)) scene.getNamedNode(name)[job.handle] = value;
+  frames.push({ picture: await picture(), ...state(scene, job, of) });
   return { live, frames, checked: job.displacers ? await check(scene, job.file) : null };
 }
 async function main() {
@@ -192,6 +201,10 @@ main().catch((e) => ({ failed: String(e.stack ?? e) })).then((result) =>
 FILES = {"vrml97": "face.wrl", "x3d": "face.x3d"}
 FRAMES = (0, 12, 25)
 """At rest, half way, at the end."""
+
+
+BY_HAND = {3: 300.0, 6: -120.0, 12: -150.5, 13: 90.0, 19: -250.0, 20: 1500.0, 23: 25000.0, 49: -30000.0}
+"""FAP values sent straight to the tables: below zero, and beyond the borders."""
 
 
 @dataclass(frozen=True)
@@ -232,6 +245,8 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
                 "shapes": [s.name for s in face.scene.shapes],
                 "transforms": [t.name for t in face.scene.transforms],
                 "displacers": kind == "x3d",
+                "handle": "value" if kind == "vrml97" else "set_fraction",
+                "byHand": {f"fap_{number:02d}_{fap(number).name}": value for number, value in BY_HAND.items()},
                 "skin": "skin",
             }
         )
@@ -271,11 +286,36 @@ def test_browser_moves_the_vertices_as_we_do(played: Played, kind: str) -> None:
     unit = min(face.fapu.unit(u) for u in (Unit.MNS, Unit.MW, Unit.IRISD, Unit.ES, Unit.ENS))
     expected = np.concatenate(list(Player(face).world_frames(played.stream)))
     away, moved = [], []
-    for number, frame in zip(FRAMES, played.results[kind]["frames"], strict=True):
+    for number, frame in zip(FRAMES, played.results[kind]["frames"][:-1], strict=True):
         away.append(float(np.linalg.norm(shown(face.scene, frame) - expected[number], axis=1).max()) / unit)
         moved.append(float(np.linalg.norm(expected[number] - face.scene.world_neutral(), axis=1).max()) / unit)
     assert min(moved[1:]) > 100
     assert max(away) < 0.05, away
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_face_is_moved_by_hand(played: Played, kind: str) -> None:
+    """Values that are sent to the tables are summed as the standard says, without rules for FAPs that fight."""
+    scene = played.face.scene
+    expected = Player(played.face, rules=()).pose(BY_HAND).world()
+    away = np.abs(shown(scene, played.results[kind]["frames"][-1]) - expected).max()
+    assert np.abs(expected - scene.world_neutral()).max() > 100 * played.face.fapu.unit(Unit.MNS)
+    assert away < 0.05 * played.face.fapu.unit(Unit.MNS)
+
+
+def test_the_script_knows_every_kind_of_interval() -> None:
+    """Its rule against our own, for borders and values that one face does not have."""
+    borders = [[0, 512], [-300, 0], [-300, 0, 600], [-1860, -400, 0, 600], [0, 400, 1080], [-9, -3, -1, 0]]
+    values = [-5000.0, -1860.0, -350.5, -3.0, -0.25, 0.0, 0.5, 1.0, 399.0, 600.0, 4000.0]
+    code = SCRIPT.removeprefix("javascript:")
+    code += (
+        f"console.log(JSON.stringify({json.dumps(borders)}.map((b) => {json.dumps(values)}.map((v) => uses(b, v)))))"
+    )
+    done = subprocess.run(
+        [program("x_ite", "node"), "-e", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    for edges, found in zip(borders, json.loads(done.stdout), strict=True):
+        assert np.array_equal(np.array(found), interval_weights(np.array(edges), values)), edges
 
 
 @pytest.mark.parametrize("kind", FILES)
