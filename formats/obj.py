@@ -264,7 +264,7 @@ def _corner_numbers(text: bytes, count: int) -> NDArray[np.int64]:
         numbers[0] = np.array(list(map(int, text.split())), dtype=np.int64)
         return numbers
     if re.search(rb"/\s", text):
-        text = re.sub(rb"/+(?=\s)", lambda m: b" " * len(m[0]), text)
+        text = re.sub(rb"(?<!/)/+(?=\s)", lambda m: b" " * len(m[0]), text)
     letters = np.frombuffer(text, dtype=np.uint8)
     filled = letters > 32
     filled[1:] &= letters[:-1] <= 32

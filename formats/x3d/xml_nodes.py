@@ -72,7 +72,8 @@ _TYPES = {
 _SPELLED = {"LOD": "level", "Switch": "choice"}
 """Nodes that call their children otherwise in VRML97."""
 
-_STRING = re.compile(r'"([^"\\]*(?:\\.[^"\\]*)*)"', re.DOTALL)
+_STRING = re.compile(r'"([^"\\]*(?:\\.[^"\\]*)*)("|\\?\Z)', re.DOTALL)
+"""One without its closing mark reaches to the end: it is left out, and not looked for again at every later mark."""
 
 
 # --- writing ------------------------------------------------------------------------------------------------
@@ -181,7 +182,7 @@ def _value(kind: str, text: str, where: str) -> Value:
     if kind == "SFString":
         return Strings((text,))
     if kind == "MFString":
-        found = [re.sub(r"\\(.)", r"\1", s, flags=re.DOTALL) for s in _STRING.findall(text)]
+        found = [re.sub(r"\\(.)", r"\1", s, flags=re.DOTALL) for s, end in _STRING.findall(text) if end == '"']
         return Strings(tuple(found or ([text] if text.strip() else [])), True)
     if kind.endswith("Bool"):
         words = text.split()

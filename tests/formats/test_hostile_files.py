@@ -120,6 +120,16 @@ def test_very_many_objects_are_one(tmp_path: Path) -> None:
     assert "1002 objects are read as one" in " ".join(scene.document.remarks)
 
 
+def test_marks_that_open_and_never_close_are_read_in_one_go(tmp_path: Path) -> None:
+    """Each was once followed to the end, from every one of them."""
+    many = 200_000
+    refused(tmp_path / "x.obj", CORNERS + b"f 1/ 2 3\nf 1" + b"/" * many + b"x 2 3\n", "line 5")
+    for tail in (b"", b"\\"):
+        info = b'"one" "' + b'\\"' * many + tail
+        text = b"<X3D><Scene><WorldInfo info='" + info + b"'/></Scene></X3D>"
+        refused(tmp_path / "x.x3d", text, "no IndexedFaceSet")
+
+
 # --- out of all bounds ----------------------------------------------------------------------------------------------
 
 
