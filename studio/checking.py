@@ -96,7 +96,7 @@ class CheckResult:
 
 def check_file(path: Path) -> list[Finding]:
     """What is wrong with the file itself; USD files go through OpenUSD's validators and our own."""
-    if path.suffix.lower() not in (".usd", ".usda", ".usdc"):
+    if path.suffix.lower() not in (".usd", ".usda", ".usdc", ".usdz"):
         return []
     from formats.usd.validate import validate_stage
 
