@@ -37,6 +37,8 @@ CONTOURS = (
     ("4.1", "4.3", "4.5"),
     ("4.2", "4.4", "4.6"),
     ("2.13", "2.11", "2.1", "2.12", "2.14"),
+    ("11.3", "temple left", "outline left"),
+    ("11.2", "temple right", "outline right"),
 )
 BETWEEN = 2
 """Points put on a contour between two neighbours: eight points of a lip become a curve."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from photo_faces import SIZE, UNIT, layout, points
+from photo_faces import EYES, SIZE, UNIT, layout, points
 
 from cloning.image.align import fit_similarity_2d
 from cloning.image.color import RGB_FROM_YUV, YUV_FROM_RGB, is_grey, to_rgb, to_yuv
@@ -96,6 +96,21 @@ def test_the_ring_surrounds_the_face_and_stays_in_the_picture() -> None:
     assert (ring <= np.array(SIZE) - 1).all()
     assert (ring.min(axis=0) <= face.min(axis=0)).all()
     assert (ring.max(axis=0) >= face.max(axis=0)).all()
+
+
+def test_brows_do_not_pull_at_the_hair() -> None:
+    sides = {"temple left": (1.05, -0.45), "outline left": (1.15, 0.2), "4.5": (0.88, -0.5), "11.3": (0.75, -0.95)}
+    right = {"temple left": "temple right", "outline left": "outline right", "4.5": "4.6", "11.3": "11.2"}
+    face = points() | {n: (EYES[0] + UNIT * x, EYES[1] + UNIT * y) for n, (x, y) in sides.items()}
+    face |= {right[n]: (EYES[0] - UNIT * x, EYES[1] + UNIT * y) for n, (x, y) in sides.items()}
+    face = {n: p for n, p in face.items() if n not in ("10.9", "10.10")}
+    raised = face | {n: (face[n][0], face[n][1] - 0.05 * UNIT) for n in ("4.5", "4.6")}
+    mesh = triangulate(refined(raised), refined(face), SIZE)
+    brows = [i for i, name in enumerate(mesh.names) if name in ("4.5", "4.6")]
+    ring = np.arange(len(mesh.names), len(mesh.places))
+    touching = np.isin(mesh.triangles, brows).any(axis=1)
+    assert touching.any()
+    assert not np.isin(mesh.triangles[touching], ring).any()
 
 
 def test_the_mask_is_soft_and_ends_inside_the_face() -> None:
