@@ -7,7 +7,7 @@ A MakeHuman head is cloned onto two other phenotypes, as they are and decimated 
 units are the truth (as they are, and scaled by FAPUs), and onto ICT-FaceKit, where no truth exists. The head is a mean
 phenotype with MakeHuman's own units, so that nothing but cloning differs from the truth; or the shipped source's,
 whose units are smoothed. Each backend's default mode stands beside the published one. --write puts the tables into
-docs/benchmarks.md and docs/backends.
+docs/backends and, when all backends are measured, into docs/benchmarks.md.
 """
 
 from __future__ import annotations
@@ -51,6 +51,9 @@ DOCUMENTED = {
     "flips%": "flips, %",
     "still": "back of the head",
 }
+PAGES = {"vtc-image": "vtc"}
+"""Backends that share a page with another one."""
+
 SOURCES = {"mean": phenotype_mean, "shipped": source_head}
 FACE_UNITS = ("eyeBlinkLeft", "mouthSmileLeft", "jawOpen", "browInnerUp", "mouthFunnel", "cheekPuff")
 
@@ -103,10 +106,12 @@ def main() -> None:
     if options.json is not None:
         options.json.write_text(json.dumps(rows, indent=2))
     if options.write:
-        put_tables(DOCS / "benchmarks.md", {"fidelity": document_table(rows)})
-        for name in ("fit", "dt", "fmc"):
-            if any(row["backend"] == name for row in rows):
-                put_tables(DOCS / "backends" / f"{name}.md", {"fidelity": backend_table(rows, name)})
+        measured = options.backends.split(",")
+        if {b.name for b in backends()} <= set(measured):
+            put_tables(DOCS / "benchmarks.md", {"fidelity": document_table(rows)})
+        for name in measured:
+            table = {"fidelity image" if name == "vtc-image" else "fidelity": backend_table(rows, name)}
+            put_tables(DOCS / "backends" / f"{PAGES.get(name, name)}.md", table)
 
 
 def targets(makehuman: object, faces: Path) -> Iterator[Target]:

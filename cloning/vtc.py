@@ -1,7 +1,7 @@
 """Vertex tents as a backend: a copy of the source on the target, one-ring by one-ring, then the target's own vertices.
 
 After Song et al. The default mode finds the correspondence with the elastic template; published mode has the paper's
-own mesh image (see `cloning.vtc_image`, which is also a backend of its own).
+own mesh image (see `cloning.vtc_image`, which is also a backend of its own, and `cloning.recast`).
 """
 
 from __future__ import annotations
