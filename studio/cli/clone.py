@@ -37,7 +37,12 @@ def clone(
     ] = None,
     backend: Annotated[str, typer.Option(help="How motion is cloned: fit, dt, vtc, vtc-image, fmc or ec.")] = "fit",
     as_published: Annotated[
-        bool, typer.Option("--as-published", help="Do literally what the paper says, for comparison.")
+        bool,
+        typer.Option(
+            "--as-published",
+            help="Do literally what the paper says, for comparison; vtc and vtc-image then give the target's shape in "
+            "the source's topology.",
+        ),
     ] = False,
     faps: Annotated[str | None, typer.Option(help="Only these FAPs, e.g. 3,5,12-14 or open_jaw.")] = None,
     open_jaw: OpenJaw = None,
