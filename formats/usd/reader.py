@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 from fat.face import AnimatableFace
 from fat.tables import FaceDefTable, FaceDefTables, FaceDefTransform, TransformField
@@ -111,11 +111,15 @@ class _Walk:
         self._axes = axes
         self._own = own
         self.meshes: list[Usd.Prim] = []
+        self._taken: set[Sdf.Path] = set()
 
     def kept(self, parent: Usd.Prim) -> list[Node]:
         """The nodes that this toolkit's writer put below a prim, whose meshes stand elsewhere in the stage."""
         nodes: list[Node] = []
         for prim in targets(parent, CHILDREN):
+            if prim.GetPath() in self._taken:
+                raise InputFileError(f"{parent.GetPath()}: {PREFIX}{CHILDREN} leads to {prim.GetPath()} a second time")
+            self._taken.add(prim.GetPath())
             name = name_of(prim)
             if prim.IsA(UsdGeom.Mesh):
                 self.meshes.append(prim)

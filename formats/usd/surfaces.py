@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from pxr import Gf, Sdf, Tf, Usd, UsdShade
 
+from fba.errors import InputFileError
 from fba.mesh import Material
 from fba.shading import Shading, TextureMap
 from formats.material_json import material_json, read_material
@@ -110,11 +111,20 @@ def keep_shading(prim: Usd.Prim, material: Material) -> None:
 
 
 def kept_shading(prim: Usd.Prim, metallic: object, roughness: object) -> Shading | None:
-    """The shading that `keep_shading` kept, as long as the surface's own numbers still agree with it."""
+    """The shading that `keep_shading` kept, as long as the surface's own numbers still agree with it.
+
+    Raises
+    ------
+    InputFileError
+        If it is damaged.
+    """
     text = get(prim, "shading")
     if text is None:
         return None
-    shading = read_material(json.loads(str(text))).shading
+    try:
+        shading = read_material(json.loads(str(text))).shading
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputFileError(f"{prim.GetPath()} is damaged: its fba:shading is no material ({error})") from error
     same = shading is not None and (metallic, roughness) == (
         Gf.Vec2f(shading.metallic, shading.roughness)[0],
         Gf.Vec2f(shading.metallic, shading.roughness)[1],

@@ -247,6 +247,18 @@ def test_what_another_program_changes_wins_over_the_exact_twins(tmp_path: Path) 
     assert np.allclose(half, before, atol=1e-5)
 
 
+@pytest.mark.parametrize("child", ["/small/head", "/small/skin"])
+def test_a_tree_that_bites_its_tail_is_refused(tmp_path: Path, child: str) -> None:
+    path = tmp_path / "face.usda"
+    usd.write(small_face(), path)
+    stage = Usd.Stage.Open(str(path))
+    stage.GetPrimAtPath("/small/head/eye_left_yaw").GetRelationship("fba:children").AddTarget(child)
+    stage.GetRootLayer().Save()
+    del stage
+    with pytest.raises(InputFileError, match="a second time"):
+        usd.read(path)
+
+
 def test_a_file_that_somebody_holds_open_is_read_as_it_is_now(tmp_path: Path) -> None:
     path = tmp_path / "face.usdc"
     usd.write(small_face(), path)

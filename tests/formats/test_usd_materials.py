@@ -13,6 +13,7 @@ from PIL import Image
 from pxr import Usd, UsdGeom, UsdShade
 
 from fba import FaceScene
+from fba.errors import InputFileError
 from fba.shading import Shading, TextureMap
 from formats import read_scene, write
 from formats.usd.validate import validate_stage
@@ -118,6 +119,18 @@ def test_colours_are_linear_light(tmp_path: Path) -> None:
     assert np.allclose(found, (0.4479884, 0.0732390, 0.0732390), atol=1e-6)  # sRGB .7, .3, .3 by IEC 61966-2-1.
     colors = np.array(UsdGeom.Mesh(stage.GetPrimAtPath("/small/skin")).GetDisplayColorAttr().Get())
     assert np.allclose(colors, np.linspace(0.0, 1.0, 32).reshape(8, 4)[:, :3], atol=1e-6)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", "7", '{"name": 3}'])
+def test_a_damaged_material_is_said(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "face.usda"
+    write(_scene(), path)
+    stage = Usd.Stage.Open(str(path))
+    stage.GetPrimAtPath("/small/Materials/face").GetAttribute("fba:shading").Set(text)
+    stage.GetRootLayer().Save()
+    del stage
+    with pytest.raises(InputFileError, match="damaged"):
+        read_scene(path)
 
 
 def test_a_surface_that_another_program_changed_loses_the_kept_shading(tmp_path: Path) -> None:
