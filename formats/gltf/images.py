@@ -7,6 +7,7 @@ from urllib.parse import unquote
 
 from formats.gltf.data import GltfData, Json
 from formats.image_kinds import image_type
+from formats.names import UniqueNames
 
 _EXTENSIONS = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp"}
 
@@ -22,6 +23,7 @@ class Images:
     def __init__(self, data: GltfData) -> None:
         self.inside: dict[str, bytes] = {}
         self._data = data
+        self._labels = UniqueNames()
         self._names: dict[object, str | None] = {}
 
     def name(self, index: object) -> str | None:
@@ -49,8 +51,4 @@ class Images:
         """A file name that no other image has."""
         stem = re.sub(r"[^\w.-]+", "_", label).strip(".")[:80] or "image"
         stem = stem.removesuffix(extension) if extension else stem
-        name, number = f"{stem}{extension}", 1
-        while name in self.inside:
-            number += 1
-            name = f"{stem}_{number}{extension}"
-        return name
+        return self._labels.take(stem, extension)

@@ -17,6 +17,7 @@ from formats.gltf.images import Images
 from formats.gltf.read_primitives import MODES, TRIANGLES, ReadPrimitive, joined, joined_attributes
 from formats.gltf.surfaces import Surfaces
 from formats.matrices import transform_fields
+from formats.names import UniqueNames
 
 _DEEPEST = 200
 
@@ -64,7 +65,7 @@ def read_data(data: GltfData) -> FaceScene:
 class _Reader:
     def __init__(self, data: GltfData) -> None:
         self.data = data
-        self.names: set[str] = set()
+        self.names = UniqueNames()
         self.visited: set[int] = set()
         self.targets: dict[str, dict[str, Floats]] = {}
         self.skinned: list[Node] = []
@@ -127,16 +128,8 @@ class _Reader:
         if not inside or not fields:
             return inside
         label = self.data.name(node) or "node"
-        name = self._unique(f"{label}_transform" if "mesh" in node else label)
+        name = self.names.take(f"{label}_transform" if "mesh" in node else label)
         return [Transform(name, tuple(inside), **fields)]  # type: ignore[arg-type]
-
-    def _unique(self, name: str) -> str:
-        label, number = name, 1
-        while label in self.names:
-            number += 1
-            label = f"{name}_{number}"
-        self.names.add(label)
-        return label
 
     def _fields(self, node: Json) -> dict[str, tuple[float, ...]]:
         """The transform's fields that are not neutral."""
@@ -168,7 +161,7 @@ class _Reader:
             parts.append(ReadPrimitive(data, entry))
         if not parts:
             return None
-        name = self._unique(data.name(node) or data.name(mesh) or "mesh")
+        name = self.names.take(data.name(node) or data.name(mesh) or "mesh")
         mesh_of_all, materials = joined(data, parts, self.surfaces)
         self.attributes[name] = joined_attributes(parts)
         self.targets[name] = self._targets(parts, names)

@@ -22,6 +22,7 @@ from fba.errors import FbaError, InputFileError, MeshError
 from fba.scene import FaceScene
 from formats import read, read_scene, write
 from formats.gltf import data as gltf_data
+from formats.names import UniqueNames
 from formats.textures import texture_bytes, texture_names
 from formats.usd.crate import impossible_count
 
@@ -128,6 +129,19 @@ def test_marks_that_open_and_never_close_are_read_in_one_go(tmp_path: Path) -> N
         info = b'"one" "' + b'\\"' * many + tail
         text = b"<X3D><Scene><WorldInfo info='" + info + b"'/></Scene></X3D>"
         refused(tmp_path / "x.x3d", text, "no IndexedFaceSet")
+
+
+def test_very_many_nodes_of_one_name(tmp_path: Path) -> None:
+    """Every number behind a name was once tried again for each of them."""
+    document = gltf_of(tmp_path)
+    node = next(n for n in document["nodes"] if "mesh" in n)
+    count = 20_000
+    names = UniqueNames()
+    assert [names.take("a") for _ in range(count)] == ["a", *(f"a_{k}" for k in range(2, count + 1))]
+    document["nodes"] = [{"mesh": node["mesh"], "name": "a"}] * 300
+    document["scenes"] = [{"nodes": list(range(300))}]
+    (tmp_path / "x.gltf").write_text(json.dumps(document))
+    assert [s.name for s in read_scene(tmp_path / "x.gltf").shapes][-1] == "a_300"
 
 
 # --- out of all bounds ----------------------------------------------------------------------------------------------

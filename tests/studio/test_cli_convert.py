@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from faces import small_face
 from typer.testing import CliRunner, Result
 
 from fat.open_jaw import open_jaw_mode
-from formats import read_face
+from formats import read_face, write
 from formats.arkit_csv import COLUMNS
 from formats.fap import read_fap
 from formats.timecode import timecode
@@ -154,3 +155,19 @@ def test_inspecting_streams(tmp_path: Path, cues: Path, curves: Path) -> None:
         assert result.exit_code == 0
         about = json.loads(result.stdout)
         assert (about["kind"], about["frames"]) == ("FAP stream", frames)
+
+
+def test_every_kind_becomes_the_animation_of_a_face(tmp_path: Path, cues: Path, curves: Path) -> None:
+    write(small_face(), tmp_path / "face.wrl")
+    assert fba("convert", curves, tmp_path / "take.fba").exit_code == 0
+    for path, frames in ((cues, 20), (curves, 3), (tmp_path / "take.fba", 3)):
+        result = fba("export", tmp_path / "face.wrl", "-o", tmp_path / "face.bt", "--stream", path)
+        assert result.exit_code == 0, result.output
+        assert f"{frames} frames" in result.stdout
+        assert fba("convert", tmp_path / "face.bt", tmp_path / "again.fap").exit_code == 0
+        assert len(read_fap(tmp_path / "again.fap")[0]) == frames
+
+
+def test_messages_do_not_steer_the_terminal(tmp_path: Path) -> None:
+    (tmp_path / "x.fap").write_bytes(b"\x1b[2J\x07 x\x9b31m\n")
+    refused(fba("convert", tmp_path / "x.fap", tmp_path / "y.fap"), "not '\N{REPLACEMENT CHARACTER}[2J")
