@@ -177,7 +177,9 @@ class Analogy:
         else:
             neutral, posed = pair
             if not self.as_published:
-                posed = without_foreign_texture(neutral, posed, np.where(asked, warped[0], 0.0), self._unit)
+                inside = self._inside
+                target = np.where(asked[inside], warped[0][inside], np.float32(0.0))
+                posed[inside] = without_foreign_texture(neutral[inside], posed[inside], target, self._unit)
             change, steps = self._transfer(warped[0], neutral, posed, warp.mask)
             warped[0] += warp.skin * change
         shown = self.teeth and self._opens(expression.points, warp.moved)
