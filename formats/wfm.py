@@ -102,7 +102,7 @@ class _Rows:
 
     def number(self, what: str) -> int:
         words = next(self._rest, [])
-        if len(words) != 1 or not words[0].isdigit():
+        if len(words) != 1 or not _is_number(words[0]):
             raise self._error(f"expected {what}")
         return int(words[0])
 
@@ -118,7 +118,7 @@ class _Rows:
 
     def polygon(self, count: int) -> list[int]:
         words = next(self._rest, [])
-        if len(words) < 3 or not all(word.isdecimal() and int(word) < count for word in words):
+        if len(words) < 3 or not all(_is_number(word) and int(word) < count for word in words):
             raise self._error(f"expected three or more vertices of a polygon (0 to {count - 1})")
         return [int(word) for word in words]
 
@@ -134,3 +134,8 @@ class _Rows:
 
     def _error(self, message: str) -> TextSyntaxError:
         return TextSyntaxError(message, self._line, 1, str(self.path))
+
+
+def _is_number(word: str) -> bool:
+    """True for plain digits; other alphabets and numbers of very many digits cannot be converted."""
+    return word.isascii() and word.isdigit() and len(word) < 10

@@ -38,7 +38,7 @@ TEXT = """# VERTEX LIST:
 
 def written(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "m.wfm"
-    path.write_text(text)
+    path.write_text(text, "latin-1")
     return path
 
 
@@ -59,6 +59,9 @@ def test_the_neutral_mesh(tmp_path: Path) -> None:
         ("1 0 0\n", "1 0\n", "line 4.*three finite coordinates"),
         ("1 0 0\n", "1 inf 0\n", "line 4.*three finite coordinates"),
         ("# FACE LIST:\n1", "# FACE LIST:\nmany", "line 8.*the number of polygons"),
+        ("# FACE LIST:\n1", "# FACE LIST:\n\N{SUPERSCRIPT THREE}", "line 8.*the number of polygons"),
+        ("# FACE LIST:\n1", "# FACE LIST:\n" + "9" * 5000, "line 8.*the number of polygons"),
+        ("0 1 2\n", f"0 1 {'9' * 5000}\n", "line 9.*three or more"),
     ],
 )
 def test_damaged_meshes_name_the_line(tmp_path: Path, old: str, new: str, said: str) -> None:
