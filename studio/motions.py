@@ -59,7 +59,7 @@ def _motion(name: str) -> PosePick:
 def _fap(part: str, motion: str) -> tuple[int, float]:
     name, _, value = (p.strip() for p in part.partition("="))
     try:
-        number = fap(int(name) if name.isdigit() else name).id
+        number = fap(int(name) if name.isdecimal() else name).id
         if number in (VISEME_FAP, EXPRESSION_FAP):
             raise KeyError
         return number, float(value) if value else float(amplitudes()[number].values[0])

@@ -45,12 +45,12 @@ def parse_faps(text: str) -> tuple[int, ...]:
     numbers: list[int] = []
     for part in filter(None, (p.strip() for p in text.split(","))):
         low, dash, high = part.partition("-")
-        if dash and low.isdigit() and high.isdigit():
+        if dash and low.isdecimal() and high.isdecimal():
             if int(high) < int(low):
                 raise ValueError(f"the FAPs {part} run backwards; write {high}-{low}")
             numbers += range(int(low), int(high) + 1)
         else:
-            numbers.append(int(part) if part.isdigit() else _by_name(part))
+            numbers.append(int(part) if part.isdecimal() else _by_name(part))
     for number in numbers:
         try:
             fap(number)
