@@ -24,6 +24,7 @@ from formats.mtl import find_materials, format_mtl
 from formats.names import unique_names
 from formats.obj_writer import ObjText, write_obj
 from formats.text_lines import TextLines
+from formats.vertex_colors import scene_colors, shown_colors
 
 _log = logging.getLogger(__name__)
 
@@ -117,7 +118,7 @@ def read(path: Path) -> FaceScene:
         _log.info("%s: %s", path, remark)
     named = tuple(s.name for s in shapes) if len(shapes) > 1 or objects.names else ()
     document = ObjDocument(mesh.indices, mesh.offsets, tuple(remarks), named, colors)
-    return FaceScene(shapes, name=path.stem, document=document)
+    return FaceScene(shapes, name=path.stem, document=document, vertex_attributes=scene_colors(colors))
 
 
 def write(face: FaceScene | AnimatableFace, path: Path) -> None:
@@ -165,10 +166,10 @@ class _OwnOrder(TypedDict, total=False):
 
 
 def _own_order(scene: FaceScene) -> _OwnOrder:
-    """How the OBJ file that the scene came from had its polygons; nothing for scenes of other formats."""
+    """How the OBJ file that the scene came from had its polygons; of scenes of other formats the colours alone."""
     document = scene.document
     if not isinstance(document, ObjDocument):
-        return {}
+        return {"colors": shown_colors(scene)}
     return {
         "polygons": (document.indices, document.offsets),
         # Shapes that were cut out later are no objects of the file.

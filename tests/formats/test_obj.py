@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from fba.errors import FbaError, InputFileError, MeshError, OutputFileError, TextSyntaxError
 from fba.mesh import Material, PolyMesh
 from fba.scene import FaceScene, Frame, Shape, Transform
+from formats import gltf
 from formats.obj import ObjDocument, read, write
 
 SQUARE = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -291,3 +292,18 @@ def test_damaged_text_never_fails_otherwise(tmp_path: Path, start: int, length: 
     except FbaError:
         return
     assert np.isfinite(scene.world_neutral()).all()
+
+
+def test_vertex_colours_go_to_gltf_and_back(tmp_path: Path) -> None:
+    colors = [[0.0, 0.02, 1.0], [0.5, 0.25, 0.75], [1.0, 0.9, 0.1]]
+    points = ("0 0 0", "1 0 0", "0 1 0")
+    rows = "".join(f"v {p} {' '.join(map(str, c))}\n" for p, c in zip(points, colors, strict=True))
+    (tmp_path / "a.obj").write_text(rows + "f 1 2 3\n")
+    scene = read(tmp_path / "a.obj")
+    assert np.isclose(scene.vertex_attributes["color"][1, 0], 0.21404114)
+    gltf.write(scene, tmp_path / "b.glb")
+    write(gltf.read_foreign(tmp_path / "b.glb"), tmp_path / "c.obj")
+    written = [line.split()[4:] for line in (tmp_path / "c.obj").read_text().splitlines() if line.startswith("v ")]
+    assert np.allclose(np.array(written, float), colors, atol=1e-6)
+    (tmp_path / "a.obj").write_text(rows.replace("0.9", "90") + "f 1 2 3\n")
+    assert not read(tmp_path / "a.obj").vertex_attributes
