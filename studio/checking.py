@@ -16,6 +16,7 @@ from fat.fap_quality import FapQuality
 from fat.validate import validate
 from fba.faps import LOW_LEVEL_FAPS
 from fba.findings import Finding
+from studio.checked_skin import CheckedSkin, check_skin
 from studio.fidelity import Fidelity, fidelity
 from studio.judging import Measured, measure, verdicts
 from studio.verdicts import Verdict
@@ -110,8 +111,12 @@ def check_face(
     findings = (*file_findings, *validate(face))
     if any(f.severity == "error" for f in findings):
         return CheckResult(findings, True, (), (), None)
-    mine = _measured(face)
-    theirs = None if source is None else _measured(source)
+    skin = check_skin(face)
+    mine = _measured(face, skin)
+    theirs: Measured | None = mine
+    if source is not face:
+        alike = source is not None and source.scene is face.scene and source.feature_points is face.feature_points
+        theirs = None if source is None else _measured(source, skin if alike else check_skin(source))
     beside = None if source is None else fidelity(face, source)
     seen = {fap.fap_id for fap in mine.own}
     unmeasured = tuple(t.name for t in face.tables if t.fap_id in LOW_LEVEL_FAPS and t.fap_id not in seen)
@@ -127,7 +132,7 @@ def check_face(
     )
 
 
-def _measured(face: AnimatableFace) -> Measured:
+def _measured(face: AnimatableFace, skin: CheckedSkin | None) -> Measured:
     neutral = Player(face).pose().local
     off = [float(np.abs(neutral[s.name] - s.mesh.vertices).max(initial=0.0)) for s in face.scene.shapes]
-    return measure(face, max(off, default=0.0) / face.fapu.es0, conformance(face))
+    return measure(face, max(off, default=0.0) / face.fapu.es0, conformance(face), skin)

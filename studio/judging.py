@@ -12,7 +12,7 @@ from fat.held_out import misplaced
 from fba.errors import LandmarkError
 from fba.faps import faps
 from fba.fapu import FAPU_POINTS, Fapu
-from studio.checked_skin import check_skin
+from studio.checked_skin import CheckedSkin
 from studio.fap_measuring import measure_faps
 from studio.fidelity import Fidelity
 from studio.measures import BY_CODE
@@ -44,9 +44,8 @@ class Measured:
     motions: tuple[MotionMeasures, ...]
 
 
-def measure(face: AnimatableFace, neutral: float, own: Sequence[FapConformance]) -> Measured:
-    """Measure a face whose tables can be played."""
-    skin = check_skin(face)
+def measure(face: AnimatableFace, neutral: float, own: Sequence[FapConformance], skin: CheckedSkin | None) -> Measured:
+    """Measure a face whose tables can be played; `skin` is None for a face without any."""
     motions = () if skin is None else tuple(measure_motions(face, skin))
     return Measured(face, neutral, tuple(own), tuple(measure_faps(face, skin)), motions)
 

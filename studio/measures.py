@@ -208,7 +208,7 @@ MEASURES: tuple[Measure, ...] = (
         "% of the skin",
         "beyond",
         1.0,
-        8.0,
+        5.0,
         False,
         "share of the triangles before the eyeballs that cross a triangle of an eyeball made smaller by .02 of its "
         "radius, but not at rest",

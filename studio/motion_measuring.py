@@ -28,6 +28,9 @@ MOVING = 0.02
 TORN = 10
 """A tear is as steep as its tenth-steepest edge: one or two bad edges are a flaw of the mesh, not a tear."""
 
+NEAR_TEETH = 0.25
+"""Lips nearer than this to a tooth at rest are watched, in eye separations: a lip is .2 thick."""
+
 EAR_FAPS = (65, 66, 67, 68)
 UPPER, LOWER = 1, 2
 """Labels of the lips, see `cloning.labels`."""
@@ -189,7 +192,7 @@ class _Measurer:
         triangles = self.skin.surface.triangles
         teeth = [s.name for r in (Role.UPPER_TEETH, Role.LOWER_TEETH) for s in self.face.scene.with_role(r)]
         teeth = [name for name in teeth if len(self.face.scene.shape(name).mesh.triangles)]
-        lips = np.isin(self.skin.labels, (UPPER, LOWER))
+        lips = np.isin(self.skin.labels, (UPPER, LOWER)) & self._before(teeth)
         balls = []
         around = np.zeros(len(lips), dtype=bool)
         for ball, names in self.skin.eyeballs:
@@ -203,6 +206,17 @@ class _Measurer:
             if bodies and len(watched):
                 found[name] = _Obstacle(watched, bodies)
         return found
+
+    def _before(self, teeth: list[str]) -> Bools:
+        """(n,) the skin near some teeth at rest."""
+        from scipy.spatial import cKDTree
+
+        if not teeth:
+            return np.zeros(self.skin.surface.vertex_count, dtype=bool)
+        es0 = self.face.fapu.es0
+        tree = cKDTree(np.concatenate([self.rest[n] for n in teeth]) / es0)
+        away = tree.query(self.skin.surface.vertices, distance_upper_bound=NEAR_TEETH)[0]
+        return np.asarray(away) < NEAR_TEETH
 
 
 @dataclass(frozen=True, eq=False)
