@@ -6,6 +6,8 @@ tear it is not (Xiang et al. 2008, figure 6).
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from PIL import Image
 
@@ -31,27 +33,36 @@ DARK = (96, 112, 140)
 SKIN = (0.90, 0.82, 0.76)
 
 
-def chessboard(source: SkinPlaces, target: SkinPlaces, size: tuple[int, int] = (480, 600)) -> Image.Image:
+def chessboard(
+    source: SkinPlaces,
+    target: SkinPlaces,
+    size: tuple[int, int] = (480, 600),
+    poses: Sequence[tuple[str, Mapping[str, Floats], Mapping[str, Floats]]] = (),
+) -> Image.Image:
     """Draw source and target with the board, side by side.
 
     Parameters
     ----------
     source, target : as from `cloning.mapping.map_skin`.
     size : (width, height) of each face's picture.
+    poses : more rows below the neutral faces: a caption, and for source and target shape name -> world vertices.
     """
     sheet = Sheet("Correspondence")
-    pictures = [_picture(face, size) for face in (source, target)]
+    pictures = [_picture(face, size, {}) for face in (source, target)]
     sheet.add_row("", pictures, [source.scene.name or "source", target.scene.name or "target"])
+    for caption, mine, yours in poses:
+        sheet.add_row("", [_picture(source, size, mine), _picture(target, size, yours)], [caption, caption])
     return sheet.image()
 
 
-def _picture(face: SkinPlaces, size: tuple[int, int]) -> UInt8:
+def _picture(face: SkinPlaces, size: tuple[int, int], world: Mapping[str, Floats]) -> UInt8:
     board = _board()
     drawables = []
     for shape in face.scene.shapes:
         if not shape.mesh.face_count or shape.role is Role.OTHER:
             continue
-        vertices, triangles = face.scene.world_vertices(shape.name), shape.mesh.triangles
+        vertices = world.get(shape.name, face.scene.world_vertices(shape.name))
+        triangles = shape.mesh.triangles
         normals = smooth_normals(vertices, triangles, same_place(vertices))
         if shape.name in face.places:
             decal = Decal(board, _on_board(face.places[shape.name])[triangles])

@@ -1,0 +1,215 @@
+"""Pandzic (2001), Facial Motion Cloning: figures 5, 6, 8, 9 and 11 to 13."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from benchmarks.papers.cast import Cast
+from cloning.align import anchor_ids
+from cloning.antialias import SUPPORT
+from cloning.prepare import PreparedFace
+from cloning.published import Projected, align_plane, build_published, project
+from cloning.source import source_motions
+from fat.quality import flips, roughness
+from fba.arrays import Floats, Ints
+from fba.faps import EXPRESSION_FAP, VISEME_FAP
+from studio.comparing import Comparison, Way, compare
+from studio.motions import parse_motions
+from studio.render import Figure, make_renderer
+from studio.render.drawable import Drawable, same_place, smooth_normals
+from studio.sheet import Sheet, UInt8, save_png
+
+MOTIONS = "surprise,viseme_ih,combination,combination-both-brows"
+FIGURES = ("fmc_11_surprise", "fmc_12_viseme", "fmc_13_combination", "fmc_13_both_brows")
+WAYS = tuple(Way(name, mode) for name in ("fmc", "fit", "dt", "vtc", "ec") for mode in (False, True))
+GENERATIONS = 3
+SHOWN = 14
+"""The viseme of figure 8: rounded lips."""
+PICTURE = (460, 380)
+CELL = 150
+FRONT = ("2", "3", "4", "5", "8", "9")
+"""Groups of feature points that frame the picture of the projection."""
+GREY, BLUE, RED = (150, 150, 155), (60, 110, 200), (205, 60, 50)
+LIP_COLORS = np.array([[0.82, 0.80, 0.78], [0.85, 0.35, 0.30], [0.30, 0.45, 0.85]])
+"""Out of the lip region, upper, lower."""
+
+
+def reproduce(cast: Cast, images: Path, tell: Callable[[str], None]) -> dict[str, str]:
+    """Draw the figures into a folder; the tables, by the name of their place in the page."""
+    tell("figures 5 and 6")
+    save_png(projection(cast), images / "fmc_5_6_projection.png")
+    tell("figure 8")
+    sheet, table = antialiasing(cast)
+    sheet.save(images / "fmc_8_antialiasing.png")
+    tables = {"fmc-8": table}
+    tell("figure 9")
+    lip_regions(cast).save(images / "fmc_9_lip_regions.png")
+    tell("figures 11 to 13")
+    grids = compare(cast.grid, cast.grid, parse_motions(MOTIONS), (Way("fmc"),), cell=CELL)
+    for name, grid in zip(FIGURES, grids.grids, strict=True):
+        grid.save(images / f"{name}.png")
+    tables["fmc-grid"] = cells_table(grids)
+    tell("all backends on the same motions")
+    everyone = compare(cast.grid[:1], cast.grid[1:], parse_motions(MOTIONS), WAYS, cell=CELL)
+    everyone.grids[2].save(images / "fmc_13_backends.png")
+    tables["fmc-backends"] = means_table(everyone)
+    tell("generations")
+    again = compare(
+        cast.grid[:1],
+        cast.grid[1:],
+        parse_motions(MOTIONS),
+        (Way("fmc"), Way("fit")),
+        generations=GENERATIONS,
+        cell=CELL,
+    )
+    again.grids[0].save(images / "fmc_generations.png")
+    tables["fmc-generations"] = generations_table(again)
+    return tables
+
+
+def projection(cast: Cast) -> Image.Image:
+    """Source and target in the projected plane, before and after the target's feature points are moved."""
+    source, target = cast.source, cast.target
+    ids = anchor_ids(source.skin, target.skin)
+    mine, yours = project(source, ids), project(target, ids)
+    moved = align_plane(yours.plane, yours.points, mine.points)
+    panels = [
+        (mine.plane, source.skin.edges, mine.points, GREY, None),
+        (yours.plane, target.skin.edges, yours.points, BLUE, mine.points),
+        (moved, target.skin.edges, mine.points, BLUE, None),
+    ]
+    front = mine.points[[key.split(".")[0] in FRONT for key in ids]]
+    low, high = front.min(axis=0) - 0.2, front.max(axis=0) + 0.2
+    sheet = Sheet()
+    names = (f"{cast.source_name}, projected", f"{cast.target_name}, projected", "moved onto the source's points")
+    sheet.add_row("", [_plane(*panel, low, high) for panel in panels], names)
+    return sheet.image()
+
+
+def _plane(
+    plane: Floats,
+    edges: Ints,
+    points: Floats,
+    color: tuple[int, int, int],
+    goals: Floats | None,
+    low: Floats,
+    high: Floats,
+) -> UInt8:
+    """A mesh in the plane, its feature points as dots, lines to where they are to go."""
+    width, height = PICTURE
+    image = Image.new("RGB", PICTURE, (255, 255, 255))
+    draw = ImageDraw.Draw(image)
+
+    def at(places: Floats) -> Floats:
+        shares = (places - low) / (high - low)
+        flat: Floats = np.stack([shares[:, 0] * width, (1.0 - shares[:, 1]) * height], axis=1)
+        return flat
+
+    flat = at(plane)
+    short = np.linalg.norm(flat[edges[:, 0]] - flat[edges[:, 1]], axis=1) < 0.2 * width  # not across the seam
+    for a, b in edges[short].tolist():
+        draw.line((*flat[a], *flat[b]), fill=color)
+    if goals is not None:
+        for a, b in zip(at(points), at(goals), strict=True):
+            draw.line((*a, *b), fill=RED, width=2)
+    for x, y in at(points):
+        draw.ellipse((x - 2, y - 2, x + 2, y + 2), fill=RED)
+    return np.asarray(image)
+
+
+def antialiasing(cast: Cast) -> tuple[Sheet, str]:
+    """The published method from a dense source to a coarse target, without and with its filter."""
+    source, target = cast.source, cast.target
+    motions = [m for m in source_motions(cast.grid_face) if m.fap_id in (VISEME_FAP, EXPRESSION_FAP)]
+    skins = np.stack([source.skin.join(m.offsets) for m in motions], axis=1)
+    shown = next(k for k, m in enumerate(motions) if (m.fap_id, m.select) == (VISEME_FAP, SHOWN))
+    sheet, lines = Sheet(), ["| filter | flips, % | roughness |", "|---|---|---|"]
+    own = [roughness(source.skin.edges, skins[:, k]) for k in range(skins.shape[1])]
+    turned = [
+        flips(source.skin.vertices, source.skin.triangles, skins[:, k] / source.fapu.es0) for k in range(len(own))
+    ]
+    lines.append(f"| the source itself | {np.mean(turned):.2f} | {np.mean(own):.3f} |")
+    pictures = []
+    for support in (0.0, SUPPORT):
+        moved = build_published(source, target, support).apply(skins) / target.fapu.es0
+        surface = target.skin
+        turned = [flips(surface.vertices, surface.triangles, moved[:, k]) for k in range(moved.shape[1])]
+        rough = [roughness(surface.edges, moved[:, k]) for k in range(moved.shape[1])]
+        lines.append(f"| {support:g} | {np.mean(turned):.2f} | {np.mean(rough):.3f} |")
+        pictures.append(_mouth(target, moved[:, shown] * target.fapu.es0))
+    sheet.add_row("", pictures, ["one sample", f"mean over a radius of {SUPPORT:g}"])
+    return sheet, "\n".join(lines) + "\n"
+
+
+def _mouth(face: PreparedFace, moved: Floats) -> UInt8:
+    """The moved mouth from near."""
+    figure = Figure(face.scene, face.points)
+    world = {n: face.scene.world_vertices(n) + part for n, part in face.skin.split(moved).items()}
+    middle = 0.5 * (face.place("8.1") + face.place("2.1"))
+    camera = replace(
+        figure.camera,
+        target=tuple(float(c) for c in middle),
+        half_height=0.3 * figure.camera.half_height,
+        half_width=0.3 * figure.camera.half_width,
+    )
+    return figure.draw(world, (360, 320), camera, make_renderer("software"))
+
+
+def lip_regions(cast: Cast) -> Sheet:
+    """Lip regions by polygons, as published, above the geodesic labels of the default mode."""
+    sheet = Sheet()
+    faces = (cast.source, cast.target)
+    ids = anchor_ids(cast.source.skin, cast.target.skin)
+    polygons = [_colored(face, project(face, ids)) for face in faces]
+    labels = [_colored(face, np.where(face.labels.values <= 2, face.labels.values, 0)) for face in faces]
+    sheet.add_row("polygons (published)", polygons)
+    sheet.add_row("labels along the skin (default)", labels, (cast.source_name, cast.target_name))
+    return sheet
+
+
+def _colored(face: PreparedFace, regions: Projected | Ints) -> UInt8:
+    values = regions.lips if isinstance(regions, Projected) else regions
+    vertices = face.skin.vertices * face.fapu.es0
+    normals = smooth_normals(vertices, face.skin.triangles, same_place(vertices))
+    camera = Figure(face.scene, face.points).camera
+    drawn = Drawable(vertices, face.skin.triangles, LIP_COLORS[values], normals)
+    return make_renderer("software").render([drawn], camera, 320, 384)
+
+
+def cells_table(found: Comparison) -> str:
+    """Rows of figures 11 to 13 in numbers: worst and mean over the targets of a source."""
+    lines = ["| source | motion | FP error, mean | worst | flips, % | source's own |", "|---|---|---|---|---|---|"]
+    for source in dict.fromkeys(c.source for c in found.cells):
+        for motion in dict.fromkeys(c.motion for c in found.cells):
+            cells = [c for c in found.cells if (c.source, c.motion) == (source, motion)]
+            errors = [c.fp_error for c in cells]
+            lines.append(
+                f"| {source} | {motion} | {np.mean(errors):.4f} | {max(errors):.4f} | "
+                f"{np.mean([c.flips for c in cells]):.2f} | {cells[0].source_flips:.2f} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def means_table(found: Comparison) -> str:
+    """One line for each backend and mode."""
+    lines = ["| backend | FP error | flips, % | source's | stretch | source's |", "|---|---|---|---|---|---|"]
+    for m in found.means():
+        lines.append(
+            f"| {Way(m.backend, m.as_published)} | {m.fp_error:.4f} | {m.flips:.2f} | {m.source_flips:.2f} | "
+            f"{m.stretch:.2f} | {m.source_stretch:.2f} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def generations_table(found: Comparison) -> str:
+    """One line for each backend and generation."""
+    lines = ["| backend | generation | FP error | flips, % | stretch | drift |", "|---|---|---|---|---|---|"]
+    for m in found.means():
+        drift = "-" if m.drift is None else f"{m.drift:.3f}"
+        lines.append(f"| {m.backend} | {m.generation} | {m.fp_error:.4f} | {m.flips:.2f} | {m.stretch:.2f} | {drift} |")
+    return "\n".join(lines) + "\n"
