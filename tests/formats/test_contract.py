@@ -42,19 +42,21 @@ def test_what_is_written_reads_back(entry: Format, extension: str, tmp_path: Pat
 
 
 FAPS = frozenset({1, 2, 3, 5, 12, 19, 20, 23, 25, 37, 44, 48})
-"""Visemes, expressions, and low-level FAPs of every kind: skin, lids, eyeballs, brows, tongue, head."""
+"""Two visemes and expressions each, and low-level FAPs of every kind: skin, lids, eyeballs, brows, tongue, head."""
 
 
 @pytest.mark.parametrize("name", ["source", "quad_head", "tri_head", "closed_head"])
 def test_shipped_faces_read_back_exactly(name: str, tmp_path: Path) -> None:
     face = read_face("default")
-    face = replace(face, tables=FaceDefTables(tuple(t for t in face.tables if t.fap_id in FAPS)))
+    face = replace(
+        face, tables=FaceDefTables(tuple(t for t in face.tables if t.fap_id in FAPS and t.high_level_select < 3))
+    )
     if name != "source":
         scene = read_scene(sample(f"faces/{name}.obj"))
         points = read_landmarks(sample(f"faces/{name}.fps.json"), scene)
         face = clone(face, scene, points, backend="ec")
-    assert len(face.tables) > 25
-    for entry in formats():
+    assert len(face.tables) > 10
+    for entry in {e.module: e for e in reversed(formats())}.values():
         if entry.carries_tables:
             path = tmp_path / f"face{entry.extensions[0]}"
             write(face, path)
