@@ -92,7 +92,8 @@ def judge(code: str, readings: Iterable[Reading]) -> Verdict | None:
     word: Word = "not judged"
     if judged:
         word = "good" if worst.value <= limits[0] else "fair" if worst.value <= limits[1] else "FAIL"
-    return Verdict(code, worst.value, worst.source, limits[1] if judged else None, word, worst.where, worst.place)
+    where, place = (worst.where, worst.place) if worst.value > 0.0 else ("", Place())
+    return Verdict(code, worst.value, worst.source, limits[1] if judged else None, word, where, place)
 
 
 def _allowed(measure: Measure, reading: Reading, step: float) -> float:

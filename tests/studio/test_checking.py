@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from fat import AnimatableFace, FaceDefTables
 from formats import read_face
 from studio.checking import check_face
+from studio.cli.app import app
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +45,34 @@ def test_the_shipped_source_passes_beside_itself(source: AnimatableFace) -> None
     assert result.fidelity.lid_gap == 0.0
     assert not [f for f in (*result.problems, *result.remarks) if f.code.startswith("fap-")]
     assert all(theirs is not None and theirs.key == mine.key for mine, theirs in result.compared)
+
+
+def test_every_measure_of_a_face_beside_itself_is_told(source: AnimatableFace) -> None:
+    few = only(source, 3, 4)
+    told = check_face(few, few).to_dict()["measures"]
+    assert isinstance(told, list)
+    assert {m["word"] for m in told} <= {"good", "fair"}
+    codes = {
+        "own-fp",
+        "fp-error",
+        "held-out",
+        "lip-gap",
+        "lip-depth",
+        "teeth",
+        "lids",
+        "tear",
+        "bend",
+        "noise",
+        "still",
+    }
+    assert codes <= {m["code"] for m in told}
+    assert all(m["source"] is not None for m in told if m["code"] in ("tear", "lids", "still"))
+
+
+def test_a_picture_that_is_no_png_is_refused_before_the_work() -> None:
+    done = CliRunner().invoke(app, ["check", "default", "--worst-picture", "worst.jpg"])
+    assert done.exit_code == 2
+    assert "--worst-picture worst.jpg: the picture is a .png" in done.output
 
 
 def test_a_fap_that_moves_too_far_is_named(source: AnimatableFace) -> None:

@@ -54,6 +54,9 @@ def test_limits_are_read_beside_the_source() -> None:
         assert found is not None
         assert found.word == word, (code, value, source)
     assert judge("still", []) is None
+    nothing = judge("still", [Reading(0.0, None, "open_jaw at +600", Place((3, 1, 600)))])
+    assert nothing is not None
+    assert (nothing.where, nothing.place) == ("", Place())
 
 
 def test_a_coarser_mesh_is_as_rough_as_its_edges_are_long() -> None:
@@ -66,7 +69,7 @@ def test_a_coarser_mesh_is_as_rough_as_its_edges_are_long() -> None:
 
 def test_the_worst_reading_is_the_one_that_exceeds_its_own_limit_most() -> None:
     bad = Reading(0.5, 0.1, "b", Place((4, 1, 200)))
-    found = judge("flips-worst", [Reading(3.0, 2.9, "a"), bad, Reading(0.2, 0.2, "c")])
+    found = judge("lip-depth", [Reading(3.0, 2.9, "a"), bad, Reading(0.2, 0.2, "c")])
     assert found is not None
     assert (found.where, found.place.motion) == ("b", (4, 1, 200))
 
