@@ -38,8 +38,8 @@ class Format:
     carries_tables : a face written to it reads back with its Facial Animation Tables.
     names_images : its files name the images of materials, which then lie beside them.
     carries_streams : its writer takes a FAP stream as third argument and makes it the file's animation.
-    portable : its module also has ``write_portable(face, path, stream)`` for clients that know no MPEG-4 nodes; the
-        face plays there, its tables do not come back. The stream may be None.
+    portable : its module also has ``write_portable(face, path, stream)``, for clients that know no MPEG-4 nodes; the
+        stream may be None.
     """
 
     name: str

@@ -8,8 +8,8 @@ from dataclasses import replace
 from fba.mesh import Material
 from fba.scene import FaceScene
 from fba.shading import Shading, TextureMap
+from formats.colors import to_linear
 from formats.gltf.buffers import Buffer, Json
-from formats.gltf.colors import to_linear
 from formats.gltf.surfaces import EMISSIVE_STRENGTH, FILTERS, TEXTURE_TRANSFORM, UNLIT, WRAP_MODES
 from formats.image_kinds import has_alpha, image_type
 from formats.textures import texture_bytes, texture_names

@@ -6,7 +6,7 @@ from typing import cast
 
 from fba.mesh import Material
 from fba.shading import ALPHA_MODES, Shading, TextureMap
-from formats.gltf.colors import from_linear
+from formats.colors import from_linear
 from formats.gltf.data import GltfData, Json
 from formats.gltf.images import Images
 

@@ -9,7 +9,7 @@ from pxr import Ar, Gf, Sdf, Usd, UsdShade
 
 from fba.mesh import Material
 from fba.shading import TextureMap
-from formats.gltf.colors import from_linear, to_linear
+from formats.colors import from_linear, to_linear
 from formats.usd.names import Namer, name_of, put_name
 from formats.usd.properties import get, put, put_string
 from formats.usd.surfaces import keep_shading, kept_shading, write_shading, write_texture

@@ -13,7 +13,8 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document, n
 StreamPath = Annotated[
     Path,
     typer.Argument(
-        help="A stream: .fap, .fba, ARKit curves (.csv), Rhubarb cues (.json, .tsv); 'demo' names the shipped one."
+        help="A stream: .fap, .fba, ARKit curves (.csv), Rhubarb cues (.json, .tsv), the updates of an animated .bt or "
+        ".xmt; 'demo' and 'every_fap' name the shipped ones."
     ),
 ]
 StreamRate = Annotated[

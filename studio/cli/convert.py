@@ -24,7 +24,7 @@ def convert(
         typer.Option(help="ARKit curves: for a face whose FAP 3 leaves the lips (strict) or opens the mouth."),
     ] = "practical",
 ) -> None:
-    """Turn a stream (.fap, .fba, ARKit .csv, Rhubarb .json or .tsv) into .fap, .fba or ARKit .csv."""
+    """Turn a stream (.fap, .fba, ARKit .csv, Rhubarb .json or .tsv, animated .bt or .xmt) into .fap, .fba or .csv."""
     from formats.streams import ARKIT_CURVES, FBA_BITSTREAM, stream_format, write_stream
     from studio.cli.console import console, print_findings
     from studio.streams import open_stream

@@ -25,8 +25,8 @@ from fba.scene import rotation_matrix, translation_matrix
 from fba.shapes import ShapeSet
 from fba.stream import FapStream
 from formats import gltf, obj, read, read_face, write
+from formats.colors import from_linear, to_linear
 from formats.gltf.buffers import Buffer, to_single
-from formats.gltf.colors import from_linear, to_linear
 from formats.gltf.data import GltfData
 from formats.gltf.nodes import Nodes
 from formats.gltf.own import Pack, Unpack
