@@ -24,8 +24,8 @@ def export(
         str,
         typer.Option(
             help="native: everything the tables say, in the format's own terms; portable: for programs that know "
-            "no MPEG-4 nodes (VRML, X3D, USD); arkit, oculus, vrm: the shapes of that name, to .npz, .usda, .usdc, .glb, "
-            ".gltf or a folder of OBJ."
+            "no MPEG-4 nodes (VRML, X3D, USD); arkit, oculus, vrm: the shapes of that name, to .npz, .usda, .usdc, "
+            ".glb, .gltf or a folder of OBJ."
         ),
     ] = "native",
     open_jaw: OpenJaw = None,
