@@ -189,7 +189,7 @@ MEASURES: tuple[Measure, ...] = (
         8.0,
         False,
         "share of the lips' triangles that cross a triangle of the teeth, but not at rest",
-        f"{_HEADS} (ICT-FaceKit's thick gums: 5.5)",
+        f"{_HEADS} (ICT-FaceKit's thick gums: 6.7)",
     ),
     Measure(
         "lid-gap",
@@ -257,7 +257,7 @@ MEASURES: tuple[Measure, ...] = (
         False,
         "how abruptly a motion changes along an edge that is seen: difference of the ends' offsets over the edge's "
         "length and 1.2 mm; the tenth-steepest edge",
-        f"the source's lids and lip corners are the floor; {_HEADS} (1.9 at most)",
+        f"the source's lids and lip corners are the floor; {_HEADS} (1.6 at most)",
         floor=0.25,
     ),
     Measure(
@@ -296,7 +296,7 @@ MEASURES: tuple[Measure, ...] = (
         False,
         "what the mean over a vertex's neighbours leaves of its motion, root mean square over all vertices; it grows "
         "with the square of the edges' length",
-        f"{_HEADS} (1.8 at most); noise of a tenth of the motion is beyond",
+        f"{_HEADS} (2.2 at most); noise of a fifth of the motion is beyond",
         floor=0.05,
         finer=2.0,
     ),
