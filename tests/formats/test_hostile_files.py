@@ -97,7 +97,7 @@ def test_numbers_in_headers_are_compared_with_the_bytes(tmp_path: Path) -> None:
         refused(tmp_path / "x.ply", head % kind + faces, "cut")
     refused(tmp_path / "x.stl", bytes(80) + b"\xff\xff\xff\xff" + bytes(50), "cut")
     refused(tmp_path / "x.off", b"OFF\n400000000 400000000 0\n0 0 0\n", "cut")
-    refused(tmp_path / "x.wfm", b"# VERTEX LIST:\n4000000000\n0 0 0\n", "coordinates")
+    refused(tmp_path / "x.wfm", b"# VERTEX LIST:\n400000000\n0 0 0\n", "coordinates")
 
 
 def test_tables_of_a_usd_crate_that_end_with_the_file() -> None:
