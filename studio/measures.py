@@ -268,7 +268,7 @@ MEASURES: tuple[Measure, ...] = (
         1.3,
         2.5,
         False,
-        "99th percentile of |log(length after / before)| over the moving edges that are seen",
+        "99th percentile of the size of log(length after / before) over the moving edges that are seen",
         f"a quarter more than the source is not seen; {_HEADS} (2.2 at most)",
         floor=0.1,
     ),
