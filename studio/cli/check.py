@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from studio.cli.arguments import AsJson, FacePath
+from studio.cli.golden import check_golden
 from studio.cli.outcome import Outcome, usage
 
 if TYPE_CHECKING:
@@ -50,9 +51,23 @@ def check(
         Path | None,
         typer.Option(help="Also draw the worst place of each measure that is not good into this .png."),
     ] = None,
+    stream: Annotated[
+        Path | None, typer.Option(help="Instead, with --golden: a stream that another player has played.")
+    ] = None,
+    golden: Annotated[
+        Path | None, typer.Option(help="With --stream: the other player's frames (.npz), to be compared with ours.")
+    ] = None,
+    rules: Annotated[
+        str, typer.Option(help="With --golden: combine FAPs that fight by these rules; the standard has none.")
+    ] = "none",
     as_json: AsJson = False,
 ) -> None:
     """Check conformance and quality of every FAP, viseme and expression; ends with 1 when something fails."""
+    if stream is not None or golden is not None:
+        if source is not None or sheet is not None or worst_picture is not None:
+            usage("--golden compares the frames of a player; it does not go with --source, --sheet or --worst-picture")
+        check_golden(face, stream, golden, rules, as_json)
+        return
     from formats import read_face
     from studio.checking import check_face, check_file
     from studio.cli.console import print_json

@@ -11,7 +11,7 @@ import typer
 from studio.cli.outcome import Outcome, usage
 
 
-def check_golden(face: Path, stream: Path, golden: Path, rules: str, as_json: bool) -> None:
+def check_golden(face: Path, stream: Path | None, golden: Path | None, rules: str, as_json: bool) -> None:
     """Compare frames with what the face's tables say; ends with 1 when a vertex is off by more than a FAP unit."""
     from fat.golden import TOLERANCE, compare
     from formats import read_face
@@ -20,17 +20,19 @@ def check_golden(face: Path, stream: Path, golden: Path, rules: str, as_json: bo
     from studio.cli.console import console, findings_json, print_findings, print_json, table
     from studio.streams import open_stream
 
+    if stream is None or golden is None:
+        usage("--stream and --golden go together: what was played, and the frames that came of it")
     try:
         chosen = parse_rules(rules)
     except ValueError as error:
         usage(f"--rules: {error}")
-    frames, remarks = open_stream(stream)
+    frames, _ = open_stream(stream)
     found = compare(read_face(str(face)), frames, read_golden(golden), chosen)
     wrong = [d.finding() for d in found if not d.passed]
     if as_json:
         rows = [{**asdict(d), "passed": d.passed} for d in found]
         document = {"file": str(face), "stream": str(stream), "golden": str(golden), "tolerance": TOLERANCE}
-        print_json({**document, "motions": rows, "findings": findings_json([*remarks, *wrong]), "passed": not wrong})
+        print_json({**document, "motions": rows, "findings": findings_json(wrong), "passed": not wrong})
     else:
         out = console()
         head = ("motion", ">frames", ">largest, FAP units", ">in frame", ">vertex", ">factor", "")
@@ -47,7 +49,7 @@ def check_golden(face: Path, stream: Path, golden: Path, rules: str, as_json: bo
             for d in found
         ]
         table("", head, lines, out)
-        print_findings([*remarks, *wrong], out)
+        print_findings(wrong, out)
         out.print(f"{golden}: {len(found) - len(wrong)} of {len(found)} motions are right")
     if wrong:
         raise typer.Exit(Outcome.FINDINGS)

@@ -8,7 +8,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from enum import IntEnum
-from typing import ParamSpec
+from typing import NoReturn, ParamSpec
 
 import typer
 
@@ -79,7 +79,7 @@ def fail(message: str) -> None:
     raise typer.Exit(Outcome.BAD_INPUT)
 
 
-def usage(message: str) -> None:
+def usage(message: str) -> NoReturn:
     """Print one message on stderr and end with USAGE."""
     print(f"fba: usage: {_plain(message)}", file=sys.stderr)
     raise typer.Exit(Outcome.USAGE)
