@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from cloning.surface import Surface
-from fba.arrays import Floats
+from fba.arrays import Floats, Ints
 
 WIDTH = 0.16
 """Largest width (sigma) of a bump, in eye separations."""
@@ -77,6 +78,18 @@ class Correction:
         left: Floats = goals - self._at_points(motion)
         return left
 
+    @cached_property
+    def _reached(self) -> Ints:
+        """The vertices that lie on a bump; about a third of a head."""
+        found: Ints = np.flatnonzero(np.diff(self.wide.indptr) + np.diff(self.bumps.indptr)).astype(np.int32)
+        return found
+
+    @cached_property
+    def _support(self) -> tuple[Ints, Floats]:
+        """The vertices on which feature points lie, as places in `_reached`, and (k, s) their weights."""
+        vertices = np.unique(self.evaluate.indices)
+        return np.searchsorted(self._reached, vertices).astype(np.int32), self.evaluate[:, vertices].toarray()
+
     def _at_points(self, motion: Floats) -> Floats:
         at: Floats = (self.evaluate @ motion.reshape(len(motion), -1)).reshape(-1, *motion.shape[1:])
         return at
@@ -84,8 +97,8 @@ class Correction:
     def _add(self, bumps: Any, ridge: float, missing: Floats, active: Floats, motion: Floats) -> None:
         """Solve for the heights of the bumps, motion by motion, and add them."""
         k, count = len(self.ids), motion.shape[1]
-        support = np.unique(self.evaluate.indices)
-        at_points = self.evaluate[:, support].toarray()
+        bumps = bumps[self._reached]
+        support, at_points = self._support
         at_support = bumps[support].toarray()
         heights = np.zeros((k, count, 3))
         for m in range(count):
@@ -94,22 +107,23 @@ class Correction:
             system = rows * (at_points @ (here[:, None] * at_support))
             normal = system.T @ system
             heights[:, m] = _solve(normal, system.T @ (rows * missing[:, m]), ridge, np.abs(missing[:, m]).max())
-        added = (bumps @ heights.reshape(k, -1)).reshape(motion.shape)
+        added = (bumps @ heights.reshape(k, -1)).reshape(-1, *motion.shape[1:])
         added *= active[:, :, None]
-        motion += added
+        motion[self._reached] += added
 
     def _activity(self, motion: Floats, goals: Floats) -> Floats:
-        """(n, K) 0 where the skin rests and may not be moved, up to 1 where it moves or a feature point must."""
-        size = np.sqrt(np.einsum("nkc,nkc->nk", motion, motion))
-        largest = np.maximum(size.max(axis=0), np.linalg.norm(goals, axis=2).max(axis=0))
-        limit = np.maximum(ACTIVE * largest, 1e-300)
-        active = smooth_step(size / limit)
-        wanted = smooth_step(np.linalg.norm(goals, axis=2) / limit)
-        reached = np.flatnonzero(np.diff(self.bumps.indptr))
-        if len(reached):
-            around = self.bumps.data[:, None] * wanted[self.bumps.indices]
-            highest = np.maximum.reduceat(around, self.bumps.indptr[reached], axis=0)
-            active[reached] = np.maximum(active[reached], highest)
+        """(r, K) of the vertices on bumps: 0 where the skin rests and may not be moved, up to 1 where it moves or a
+        feature point must."""
+        squared = np.einsum("nkc,nkc->nk", motion, motion)
+        wanted = np.linalg.norm(goals, axis=2)
+        limit = np.maximum(ACTIVE * np.maximum(np.sqrt(squared.max(axis=0)), wanted.max(axis=0)), 1e-300)
+        active = smooth_step(np.sqrt(squared[self._reached]) / limit)
+        bumps = self.bumps[self._reached]
+        near = np.flatnonzero(np.diff(bumps.indptr))
+        if len(near):
+            around = bumps.data[:, None] * smooth_step(wanted / limit)[bumps.indices]
+            highest = np.maximum.reduceat(around, bumps.indptr[near], axis=0)
+            active[near] = np.maximum(active[near], highest)
         return active
 
 

@@ -117,25 +117,21 @@ def closest_on_triangles(points: Floats, corners: Floats) -> tuple[Floats, Float
     ab, ac, ap = b - a, c - a, points - a
     d00, d01, d11 = (np.einsum("...i,...i->...", x, y) for x, y in ((ab, ab), (ab, ac), (ac, ac)))
     d20, d21 = np.einsum("...i,...i->...", ap, ab), np.einsum("...i,...i->...", ap, ac)
+    app = np.einsum("...i,...i->...", ap, ap)
+
+    def squared(v: Floats, w: Floats) -> Floats:
+        found: Floats = app - 2 * (v * d20 + w * d21) + v * v * d00 + 2 * v * w * d01 + w * w * d11
+        return found
+
     det = np.maximum(d00 * d11 - d01 * d01, 1e-30)
     v, w = (d11 * d20 - d01 * d21) / det, (d00 * d21 - d01 * d20) / det
-    inside = (v >= 0) & (w >= 0) & (v + w <= 1)
+    best = np.where((v >= 0) & (w >= 0) & (v + w <= 1), squared(v, w), np.inf)
+    nothing = np.zeros_like(v)
     on_ab = np.clip(d20 / np.maximum(d00, 1e-30), 0, 1)
     on_ac = np.clip(d21 / np.maximum(d11, 1e-30), 0, 1)
-    d_bc = d00 - 2 * d01 + d11
-    on_bc = np.clip((d21 - d20 - d01 + d00) / np.maximum(d_bc, 1e-30), 0, 1)
-    options_v = np.stack([v, on_ab, np.zeros_like(v), 1 - on_bc], axis=-1)
-    options_w = np.stack([w, np.zeros_like(v), on_ac, on_bc], axis=-1)
-    app = np.einsum("...i,...i->...", ap, ap)[..., None]
-    squared = (
-        app
-        - 2 * (options_v * d20[..., None] + options_w * d21[..., None])
-        + options_v**2 * d00[..., None]
-        + 2 * options_v * options_w * d01[..., None]
-        + options_w**2 * d11[..., None]
-    )
-    squared[..., 0] = np.where(inside, squared[..., 0], np.inf)
-    best = np.argmin(squared, axis=-1)[..., None]
-    v, w = (np.take_along_axis(o, best, -1)[..., 0] for o in (options_v, options_w))
-    squared = np.take_along_axis(squared, best, -1)[..., 0]
-    return np.stack([1 - v - w, v, w], axis=-1), np.sqrt(np.maximum(squared, 0.0))
+    on_bc = np.clip((d21 - d20 - d01 + d00) / np.maximum(d00 - 2 * d01 + d11, 1e-30), 0, 1)
+    for v_edge, w_edge in ((on_ab, nothing), (nothing, on_ac), (1 - on_bc, on_bc)):
+        away = squared(v_edge, w_edge)
+        nearer = away < best
+        best, v, w = np.where(nearer, away, best), np.where(nearer, v_edge, v), np.where(nearer, w_edge, w)
+    return np.stack([1 - v - w, v, w], axis=-1), np.sqrt(np.maximum(best, 0.0))

@@ -193,13 +193,13 @@ def _brought(head: Head, source: Surface, places: Floats, known: Mapping[str, Fl
     source : the source's skin, or a part of it.
     places : (n, 3).
     """
-    from scipy.interpolate import RBFInterpolator
-
     factors, shift = head.proportions
     ids = [key for key in known if key in source.positions]
     moved: Floats = places * factors + shift
     if len(ids) < ENOUGH:
         return moved
+    from scipy.interpolate import RBFInterpolator
+
     anchors = np.array([source.positions[key] for key in ids])
     missing = np.array([known[key] for key in ids]) - (anchors * factors + shift)
     # No more than each point's own way is known: far from all of them it is the mean that counts.

@@ -36,6 +36,9 @@ SPACING = 0.05
 AGREES = 0.1
 """A surface this far off agrees by 1/e, in eye separations: about what two people's faces differ by."""
 
+AGREES_NOT = 0.7
+"""A surface farther off than this agrees by less than 1e-21: as good as none."""
+
 STRETCH = 0.02
 """How strongly a face keeps its proportions while it is stretched, against all pairs together."""
 
@@ -60,7 +63,7 @@ def register(face: Samples, target: Samples, pose: Pose, steps: int, upright: bo
 
 def agreement(face: Samples, target: Samples, pose: Pose) -> Floats:
     """(k,) how well the target lies at each point of the source's face, 0..1: near, and facing the same way."""
-    _, facing, gap = _partners(face, target, pose)
+    _, facing, gap = _partners(face, target, pose, AGREES_NOT)
     agrees: Floats = np.exp(-((gap / AGREES) ** 2)) * np.clip(facing, 0.0, 1.0)
     return agrees
 
@@ -117,17 +120,22 @@ def symmetric(target: Samples, pose: Pose, steps: int) -> Pose:
 
 def _pairs(face: Samples, target: Samples, pose: Pose, along: float) -> tuple[Floats, Bools]:
     """Partners of the face's points and which of them count; `along` goes from 0 to 1 over the steps."""
-    places, facing, gap = _partners(face, target, pose)
-    good = (facing > FACING) & (gap < REACH[0] * (REACH[1] / REACH[0]) ** along)
+    reach = REACH[0] * (REACH[1] / REACH[0]) ** along
+    places, facing, gap = _partners(face, target, pose, reach)
+    good = (facing > FACING) & (gap < reach)
     if good.any():
         good &= gap <= np.quantile(gap[good], KEPT)
     return places, good
 
 
-def _partners(face: Samples, target: Samples, pose: Pose) -> tuple[Floats, Floats, Floats]:
-    """Nearest target point of each face point, in the source's space: place, cosine of normals, distance."""
+def _partners(face: Samples, target: Samples, pose: Pose, reach: float) -> tuple[Floats, Floats, Floats]:
+    """Nearest target point of each face point, in the source's space: place, cosine of normals, distance.
+
+    Where there is none nearer than `reach` the distance is infinite.
+    """
     back = (face.points - pose.shift) @ pose.turn / pose.scale
-    distance, nearest = target.tree.query(back)
+    distance, nearest = target.tree.query(back, distance_upper_bound=(reach + SPACING) / pose.scale)
+    nearest = np.where(np.isfinite(distance), nearest, 0)
     places = pose.apply(target.points[nearest])
     facing = np.einsum("ij,ij->i", face.normals, target.normals[nearest] @ pose.turn.T)
     # Across the surface: the spacing of the samples does not count.

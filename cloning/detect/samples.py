@@ -36,7 +36,7 @@ class Samples:
         """Search tree of the points."""
         from scipy.spatial import cKDTree
 
-        return cKDTree(self.points)
+        return cKDTree(self.points, balanced_tree=False)
 
 
 def sample(surface: Surface, count: int, triangles: Any = None) -> Samples:

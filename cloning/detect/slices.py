@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,15 +22,22 @@ class Slice:
     Attributes
     ----------
     ends : (s, 2, 2) y and z of both ends of each segment.
-    neighbours : (s, 2) int64, the segment that follows at each end; -1 at a border.
+    neighbours : (s, 2) int64, at each end the other segment's end that lies there, twice its segment plus 0 or 1; -1
+        at a border.
     """
 
     ends: Floats
     neighbours: Any
 
+    @cached_property
+    def _span(self) -> tuple[Floats, Floats]:
+        """Lowest and highest place of each segment."""
+        first, last = self.ends[:, 0, 0], self.ends[:, 1, 0]
+        return np.minimum(first, last), np.maximum(first, last)
+
     def foremost(self, y: float) -> int:
         """The segment that is seen from the front at this height; -1 if there is none."""
-        low, high = self.ends[:, :, 0].min(axis=1), self.ends[:, :, 0].max(axis=1)
+        low, high = self._span
         here = np.flatnonzero((low <= y) & (y <= high) & (high > low))
         if not len(here):
             return -1
@@ -53,23 +61,25 @@ class Slice:
         if segment < 0:
             return None
         end = int(np.argmin(sign * self.ends[segment, :, 0]))
-        best: Floats = self.ends[segment, end]
+        heights, neighbours = self.ends[:, :, 0].ravel(), self.neighbours.ravel()
+        here = 2 * segment + end
+        best, lowest = here, sign * float(heights[here])
         for _ in range(len(self.ends)):
-            place = self.ends[segment, end]
-            if sign * place[0] < sign * best[0]:
-                best = place
-            if sign * best[0] < sign * limit:
+            height = sign * float(heights[here])
+            if height < lowest:
+                best, lowest = here, height
+            if lowest < sign * limit:
                 return None
-            following = int(self.neighbours[segment, end])
-            if sign * (place[0] - best[0]) > TURN or following < 0:
-                return best
-            end = 1 - int(np.flatnonzero(self.neighbours[following] == segment)[0])
-            segment = following
+            following = int(neighbours[here])
+            if height - lowest > TURN or following < 0:
+                found: Floats = self.ends[best // 2, best % 2]
+                return found
+            here = following ^ 1
         return None
 
     def profile(self, heights: Floats) -> Floats:
         """z of the foremost skin at each height; nan where there is none."""
-        low, high = self.ends[:, :, 0].min(axis=1), self.ends[:, :, 0].max(axis=1)
+        low, high = self._span
         first, step = self.ends[:, 0], self.ends[:, 1] - self.ends[:, 0]
         inside = (low[:, None] <= heights) & (heights <= high[:, None]) & (high > low)[:, None]
         slope = np.divide(step[:, 1], step[:, 0], out=np.zeros(len(step)), where=step[:, 0] != 0)
@@ -96,18 +106,21 @@ class Slicer:
         ----------
         axis : 0 for upright slices at one x, 1 for level ones at one y.
         """
-        corners = surface.vertices[surface.triangles]
-        near = np.all((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low), axis=1)
+        a, b, c = (surface.vertices[surface.triangles[:, k]] for k in range(3))
+        reaches = np.minimum(np.minimum(a, b), c) <= high
+        reaches &= np.maximum(np.maximum(a, b), c) >= low
+        near = reaches[:, 0] & reaches[:, 1] & reaches[:, 2]
         # Seams are closed: both copies of a vertex count as one.
         self._number = _welded(surface)
         self._triangles = surface.triangles[near]
         self._vertices = surface.vertices[:, [axis, 1 - axis, 2]]
+        self._sides = [np.ascontiguousarray(self._vertices[self._triangles[:, k], 0]) for k in range(3)]
 
     def at(self, x: float) -> Slice:
         """The slice at one x (or y)."""
-        above = self._vertices[self._triangles, 0] > x
-        cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
-        triangles, above = self._triangles[cut], above[cut]
+        a, b, c = (side > x for side in self._sides)
+        cut = np.flatnonzero((a != b) | (b != c))
+        triangles, above = self._triangles[cut], np.stack([a[cut], b[cut], c[cut]], axis=1)
         # The corner that lies alone on its side; the two edges from it are cut.
         lone = np.where(above.sum(axis=1) == 1, np.argmax(above, axis=1), np.argmin(above, axis=1))
         rows = np.arange(len(triangles))
@@ -124,13 +137,13 @@ class Slicer:
 
 
 def _joined(keys: Any) -> Any:
-    """The segment that shares each end's edge, from (s, 2) int64 numbers of edges; -1 where there is none."""
+    """The other end at each end's edge, from (s, 2) int64 numbers of edges; -1 where there is none."""
     order = np.argsort(keys, axis=None, kind="stable")
     _, first, count = np.unique(keys.ravel()[order], return_index=True, return_counts=True)
     # An edge of three triangles goes nowhere certain.
     a, b = order[first[count == 2]], order[first[count == 2] + 1]
     found = np.full(keys.size, -1, np.int64)
-    found[a], found[b] = b // 2, a // 2
+    found[a], found[b] = b, a
     return found.reshape(keys.shape)
 
 

@@ -18,8 +18,11 @@ FIRST = 4
 MORE = 48
 """Triangles tried where none of the first ones fits."""
 
-BLOCK = 1024
-"""So many points are looked for at once: far from the surface each has very many candidates."""
+BLOCK = 8192
+"""So many points are looked for at once ..."""
+
+OPEN_BLOCK = 256
+"""... and so many of those for which no triangle near by fits: each of them has very many candidates."""
 
 FEWEST = 0.05
 """A class of triangles of about one size holds at least this share of all, so that there are only a few."""
@@ -119,15 +122,24 @@ class TriangleSearch:
             k = min(count, len(self._some))
             near = self._all.query(points[open_rows], k=k)[1].reshape(len(open_rows), k)
             query.offer(np.repeat(open_rows, k), self._some[near].ravel())
-        for tree, ids, radius in self._classes:
-            bound = np.minimum(best.distances, reach) + radius
-            found = tree.query_ball_point(points, bound, return_sorted=False)
-            counts = np.fromiter(map(len, found), np.int64, m)
-            flat = np.fromiter(chain.from_iterable(found), np.int64, int(counts.sum()))
-            query.offer(np.repeat(np.arange(m), counts), ids[flat])
+        limits = np.broadcast_to(reach, m)
+        bounded = best.triangles >= 0
+        still = np.flatnonzero(~bounded)
+        starts = range(0, len(still), OPEN_BLOCK)
+        for rows in (np.flatnonzero(bounded), *(still[start : start + OPEN_BLOCK] for start in starts)):
+            self._search(query, points, rows.astype(np.int32), limits)
         far = best.distances > reach
         best.triangles[far], best.distances[far], best.facing[far], best.weights[far] = -1, np.inf, -1.0, 0.0
         return best
+
+    def _search(self, query: _Query, points: Floats, rows: Ints, limits: Floats) -> None:
+        """Try every triangle that can be nearer to some of the points than what they have."""
+        for tree, ids, radius in self._classes:
+            bound = np.minimum(query.best.distances[rows], limits[rows]) + radius
+            found = tree.query_ball_point(points[rows], bound, return_sorted=False)
+            counts = np.fromiter(map(len, found), np.int64, len(rows))
+            flat = np.fromiter(chain.from_iterable(found), np.int64, int(counts.sum()))
+            query.offer(np.repeat(rows, counts), ids[flat])
 
     def positions(self, places: Places) -> Floats:
         """(m, 3) the points found; meaningless where there is none."""
@@ -148,11 +160,11 @@ class _Query:
         best: Places,
     ) -> None:
         self._search, self._points, self._normals = search, points, normals
-        self._refused, self._least, self._best = refused, least_facing, best
+        self._refused, self._least, self.best = refused, least_facing, best
 
     def offer(self, rows: Ints, triangles: Ints) -> None:
         """Try pairs: row of a point, in ascending order, and index of a triangle."""
-        search, best = self._search, self._best
+        search, best = self._search, self.best
         away = self._points[rows] - search._centers[triangles]
         near = np.sqrt(np.einsum("nd,nd->n", away, away)) - search._radii[triangles] < best.distances[rows]
         kept = np.flatnonzero(near & (search._bits[triangles] & self._refused[rows] == 0))
