@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -52,13 +53,22 @@ DETOUR = 1.6
 """A way longer than this times the straight line does not follow an edge and gives no anchors."""
 
 
-def contour_anchors(surface: Surface) -> dict[str, tuple[int, Floats]]:
-    """Anchors on the edges of lips and lids.
+_ANCHORS: WeakKeyDictionary[Surface, Mapping[str, tuple[int, Floats]]] = WeakKeyDictionary()
+
+
+def contour_anchors(surface: Surface) -> Mapping[str, tuple[int, Floats]]:
+    """Anchors on the edges of lips and lids; sought once for each surface.
 
     Returns
     -------
     name -> (label of its edge, (3,) position); names are the same on every face.
     """
+    if surface not in _ANCHORS:
+        _ANCHORS[surface] = _sought(surface)
+    return _ANCHORS[surface]
+
+
+def _sought(surface: Surface) -> Mapping[str, tuple[int, Floats]]:
     found: dict[str, tuple[int, Floats]] = {}
     for contour in CONTOURS:
         if any(i not in surface.points for i in contour.points):
@@ -118,11 +128,10 @@ def _way(graph: object, places: Ints, surface: Surface, a: str, b: str) -> Ints 
     """Vertices along the cheapest way between two feature points; None where there is none."""
     from scipy.sparse.csgraph import dijkstra
 
-    new = {int(v): k for k, v in enumerate(places)}
     ends = [int(v[np.argmax(w)]) for v, w in (surface.points[a], surface.points[b])]
-    if any(v not in new for v in ends):
+    start, stop = (int(k) for k in np.searchsorted(places, ends))
+    if max(start, stop) == len(places) or [int(places[start]), int(places[stop])] != ends:
         return None
-    start, stop = (new[v] for v in ends)
     before = dijkstra(graph, indices=np.array([start]), return_predecessors=True)[1][0]  # type: ignore[call-overload]
     way = [stop]
     while way[-1] != start:

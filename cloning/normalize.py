@@ -68,7 +68,7 @@ def blend(places: Floats, anchors: Floats, values: Floats, power: float = 3.0) -
     out = np.empty((len(places), values.shape[1]))
     for start in range(0, len(places), 4096):
         block = places[start : start + 4096]
-        squared = np.sum((block[:, None] - anchors[None]) ** 2, axis=2)
+        squared = sum((block[:, axis, None] - anchors[:, axis]) ** 2 for axis in range(3))
         weights = np.maximum(squared, 1e-16) ** (-0.5 * power)
         out[start : start + 4096] = weights @ values / weights.sum(axis=1, keepdims=True)
     return out

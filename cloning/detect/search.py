@@ -133,7 +133,7 @@ class _Picture:
         depth = np.where(mask, depth - self.base, 0.0)
         self.shape = rows, columns
         self.padded = tuple(next_fast_len(n + margin, real=True) for n in self.shape)
-        self.images = [rfft2(p.astype(np.float32), self.padded) for p in (mask, depth, depth**2)]
+        self.images = rfft2(np.array([mask, depth, depth**2], np.float32), self.padded)
 
     def places(self, turn: Floats, template: Template) -> list[tuple[Floats, float]]:
         """Where a template that is turned in the picture fits best: the place of its origin, and the score."""
@@ -155,19 +155,17 @@ class _Picture:
         from scipy.fft import irfft2, rfft2
 
         parts = [np.rot90(p, roll) for p in (template.mask, template.depth, template.depth**2)]
-        kernels = [np.conj(rfft2(p.astype(np.float32), self.padded)) for p in parts]
-        size = np.array(parts[0].shape[::-1], np.float64)
-        rows, columns = (max(n - k + 1, 0) for n, k in zip(self.shape, parts[0].shape, strict=True))
-
-        def against(*pairs: tuple[float, int, int]) -> Floats:
-            # Sums of correlations are formed before the way back, which costs most.
-            spectrum = np.sum([factor * self.images[image] * kernels[part] for factor, image, part in pairs], axis=0)
-            whole: Floats = irfft2(spectrum, self.padded)
-            return whole[:rows, :columns]
-
-        count = np.maximum(against((1.0, 0, 0)), 1.0)
-        depth = against((1.0, 1, 0), (-1.0, 0, 1)) / count
-        error = against((1.0, 2, 0), (-2.0, 1, 1), (1.0, 0, 2)) - count * depth**2
+        shape = parts[0].shape
+        mask, depth, square = np.conj(rfft2(np.array(parts, np.float32), self.padded))
+        here, deep, squared = self.images
+        # Sums of correlations are formed before the way back, and all go back at once.
+        sums = np.array([here * mask, deep * mask - here * depth, squared * mask - 2.0 * deep * depth + here * square])
+        size = np.array(shape[::-1], np.float64)
+        rows, columns = (max(n - k + 1, 0) for n, k in zip(self.shape, shape, strict=True))
+        count, depth, error = irfft2(sums, self.padded)[:, :rows, :columns]
+        count = np.maximum(count, 1.0)
+        depth = depth / count
+        error = error - count * depth**2
         # A cell where the target shows nothing is as bad as one without any relief.
         cells = int(template.mask.sum())
         return 1.0 - error / template.whole - (cells - count) / cells, depth, size
