@@ -11,7 +11,16 @@ import numpy as np
 from cloning.image.color import Planes, UInt8, is_grey, luminance, relit, to_rgb, to_yuv
 from cloning.image.eri import ratio_image
 from cloning.image.grid import differences, motion_rows, tent_equations, tents, wanted_differences
-from cloning.image.mask import face_mask, mouth_opening, slit_mask
+from cloning.image.mask import (
+    bounds,
+    contour,
+    depth_within,
+    face_mask,
+    mouth_opening,
+    region_share,
+    slit_mask,
+    widened,
+)
 from cloning.image.points import (
     EYES,
     MOUTH,
@@ -63,7 +72,7 @@ class AnalogyResult:
     ----------
     rgb : (h, w, 3) uint8; where `changed` is False bit-identical to the target.
     luminance : (h, w) before rounding and clipping.
-    changed : (h, w) True where the warp moved a pixel or the mask let it change.
+    changed : (h, w) True where, in the face's region, the warp moved a pixel or the mask let it change.
     points : where the target's points are now.
     steps : of the iteration; 0 where the matrix is factored.
     teeth : True where the source's mouth was shown.
@@ -85,7 +94,8 @@ class AnalogyResult:
 class _Warp:
     """Everything geometric about one expression, on the pixels of the box.
 
-    `mask` says how much a pixel follows the source, `skin` is 0 within the eyes, which keep the target's look.
+    `mask` says how much a pixel follows the source, `skin` is 0 within the eyes, which keep the target's look, `face`
+    how much the warped face covers the target's picture.
     """
 
     mesh: WarpMesh
@@ -93,6 +103,7 @@ class _Warp:
     labels: Ints
     mask: Planes
     skin: Planes
+    face: Planes
 
 
 class Analogy:
@@ -144,8 +155,9 @@ class Analogy:
         fine = [refined(self._moved(points)) for points in expressions]
         self._box = self._box_of(fine)
         self._domain = self._domain_of(fine)
-        self._near = _widened(self._domain)
-        self._inside = _bounds(self._domain)
+        self._near = widened(self._domain)
+        self._inside = bounds(self._domain)
+        self._resting = depth_within(contour(self._target), self._box)
         self._system: PixelSystem | None = None
 
     @property
@@ -186,8 +198,9 @@ class Analogy:
         if shown:
             displaced |= self._show_mouth(warped, warp, own, expression)
         rows, columns = self._box
+        warped += (1.0 - warp.face) * (self._yuv[:, rows, columns] - warped)
         changed = np.zeros(self._picture.shape[:2], bool)
-        changed[rows, columns] = displaced | (warp.mask > 0)
+        changed[rows, columns] = (displaced | (warp.mask > 0)) & (warp.face > 0)
         rgb, whole = self._picture.copy(), self._yuv[0].copy()
         rgb[changed] = to_rgb(warped[:, changed[rows, columns]])
         whole[rows, columns] = warped[0]
@@ -214,16 +227,18 @@ class Analogy:
         return inner
 
     def _warp(self, expression: Places) -> _Warp:
-        moved = refined(self._moved(expression))
+        places = self._moved(expression)
+        moved = refined(places)
         mesh = triangulate(moved, self._fine_target, self._picture.shape[1::-1])
         labels = label_pixels(mesh, self._box)
         mask = np.where(self._domain & (labels >= 0), face_mask(moved, self._box), np.float32(0.0))
         skin = 1.0 - slit_mask(mesh, labels, moved, EYES)
-        return _Warp(mesh, moved, labels, mask, skin)
+        depth = np.maximum(self._resting, depth_within(contour(places), self._box))
+        return _Warp(mesh, moved, labels, mask, skin, region_share(depth, self._unit))
 
     def _warped_target(self, warp: _Warp) -> tuple[Planes, Bools]:
         """Planes of the warped target in the box, and which pixels the warp moved."""
-        rows, columns = np.nonzero(warp.labels >= 0)
+        rows, columns = np.nonzero((warp.labels >= 0) & ((warp.face > 0) | self._near))
         goals = np.concatenate([to_array(self._fine_target, warp.mesh.names), warp.mesh.ring])
         places = mapped(warp.mesh.affine(goals), warp.labels, rows, columns, self._box)
         here = np.stack([columns + self._box[1].start, rows + self._box[0].start])
@@ -293,22 +308,3 @@ class Analogy:
             inside = np.zeros(len(rows), np.float32) if k and self._grey else Sampler(plane, 1, shrink).at(places)
             warped[k, rows, columns] += share_here * (inside - warped[k, rows, columns])
         return share > 0
-
-
-def _bounds(domain: Bools) -> tuple[slice, slice]:
-    """Rows and columns of a domain, two more on each side."""
-    found = []
-    for axis in (1, 0):
-        at = np.flatnonzero(domain.any(axis=axis))
-        found.append(slice(int(at[0]) - 2, int(at[-1]) + 3))
-    return found[0], found[1]
-
-
-def _widened(domain: Bools) -> Bools:
-    """A domain and its neighbours."""
-    wide = domain.copy()
-    wide[1:] |= domain[:-1]
-    wide[:-1] |= domain[1:]
-    wide[:, 1:] |= domain[:, :-1]
-    wide[:, :-1] |= domain[:, 1:]
-    return wide

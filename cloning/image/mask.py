@@ -1,13 +1,13 @@
-"""Where a picture may change: a feathered mask of the face, and one of what opens in it."""
+"""Where a picture may change: the face's region, a mask of what is relit in it, and one of what opens in it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from cloning.image.color import Planes
-from cloning.image.points import Places, Slits, eye_separation, rim_names, to_array
+from cloning.image.points import Places, Slits, eye_separation, from_eyes, rim_names, to_array
 from cloning.image.warp import WarpMesh
-from fba.arrays import Bools, Ints
+from fba.arrays import Bools, Floats, Ints
 
 INSET = 0.97
 """The mask's outline lies inside the points of the face's contour, by this factor towards its middle: neither the
@@ -17,6 +17,13 @@ FEATHER = 0.15
 """Width of the mask's soft border, in eye separations: about a third of an eye. As it blends what is asked, not the
 solution, it may be narrow without showing."""
 
+REACH = 0.05
+"""So far around the face's contour the picture is still wholly that of the warp, in eye separations: points lie on a
+contour up to that, and the edge of a chin that has risen must not stay where it was."""
+
+BORDER = 0.15
+"""Width of the soft border around that, in eye separations: 1 cm. Beyond it every pixel is the target's own."""
+
 TEMPLE = 0.25
 """The temples lie so far beyond the outer ends of the brows, in eye separations: no feature point marks them, and
 without them the mask's border would run through the brows."""
@@ -25,18 +32,54 @@ RIM_FEATHER = 0.02
 """Softness of the border between lips and mouth, or lids and eye, in eye separations."""
 
 
-def face_mask(moved: Places, box: tuple[slice, slice]) -> Planes:
-    """Values 0..1 for the pixels of a box: 0 outside the face's convex hull, 1 well inside."""
+UNMARKED = (
+    (("2.13", "10.7", "10.9", "outline left"), ((1.09, 0.4), (0.83, 1.1))),
+    (("2.14", "10.8", "10.10", "outline right"), ((-1.09, 0.4), (-0.83, 1.1))),
+    (("11.1", "11.2", "11.3"), ((0.83, -0.6), (-0.83, -0.6))),
+)
+"""Points of the contour, and what stands in for a part of which there is none: half the width of cheek bones, jaw and
+forehead of the mean face (137, 105 and 105 mm, pupils 63 mm apart), to the subject's left and down, from between the
+eyes, in eye separations."""
+
+
+ROUND = 3
+"""Straight pieces into which a contour is cut between two of its points."""
+
+
+def outline(places: Places) -> Floats:
+    """(k, 2) corners of the convex hull of a face's points and its temples."""
+    points = to_array(places, list(places))
+    if "4.5" in places and "4.6" in places:
+        ends = to_array(places, ["4.5", "4.6"])
+        across = (ends[0] - ends[1]) / max(float(np.linalg.norm(ends[0] - ends[1])), 1e-12)
+        points = np.concatenate([points, ends + TEMPLE * eye_separation(places) * np.stack([across, -across])])
+    return _hull(points)
+
+
+def contour(places: Places) -> Floats:
+    """(k, 2) corners of a face's rounded contour; parts that no point marks are added as the mean face has them."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    missing = [from_eyes(places, parts) for names, parts in UNMARKED if not any(n in places for n in names)]
+    corners = _hull(np.concatenate([outline(places), *missing]))
+    tangents = np.roll(corners, -1, axis=0) - np.roll(corners, 1, axis=0)
+    tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+    corners, tangents = (np.concatenate([part, part[:1]]) for part in (corners, tangents))
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    at = np.interp(np.arange(ROUND * (len(along) - 1)) / ROUND, np.arange(len(along)), along)
+    return _hull(CubicHermiteSpline(along, corners, tangents)(at))
+
+
+def _hull(points: Floats) -> Floats:
     from scipy.spatial import ConvexHull
 
-    points = to_array(moved, list(moved))
-    if "4.5" in moved and "4.6" in moved:
-        ends = to_array(moved, ["4.5", "4.6"])
-        across = (ends[0] - ends[1]) / max(float(np.linalg.norm(ends[0] - ends[1])), 1e-12)
-        points = np.concatenate([points, ends + TEMPLE * eye_separation(moved) * np.stack([across, -across])])
-    corners = points[ConvexHull(points).vertices]
+    corners: Floats = points[ConvexHull(points).vertices]
+    return corners
+
+
+def depth_within(corners: Floats, box: tuple[slice, slice]) -> Planes:
+    """How deep each pixel of a box lies in a convex polygon, in pixels; less than 0 outside."""
     middle = corners.mean(axis=0)
-    corners = middle + INSET * (corners - middle)
     rows, columns = box
     y, x = (np.arange(part.start, part.stop, dtype=np.float32) for part in (rows, columns))
     depth = np.full((y.size, x.size), np.inf, np.float32)
@@ -47,7 +90,45 @@ def face_mask(moved: Places, box: tuple[slice, slice]) -> Planes:
         up, left = np.float32(inside * along[0]), np.float32(inside * along[1])
         np.subtract((up * (y - np.float32(a[1])))[:, None], (left * (x - np.float32(a[0])))[None, :], out=across)
         np.minimum(depth, across, out=depth)
+    return depth
+
+
+def face_mask(moved: Places, box: tuple[slice, slice]) -> Planes:
+    """How much each pixel of a box is relit, 0..1: 0 outside the face's convex hull, 1 well inside."""
+    corners = outline(moved)
+    middle = corners.mean(axis=0)
+    depth = depth_within(middle + INSET * (corners - middle), box)
     return smooth(depth / np.float32(FEATHER * eye_separation(moved)))
+
+
+def region_share(depth: Planes, unit: float) -> Planes:
+    """How much of each pixel is the warped face's, 0..1; the rest is the target's as it was.
+
+    Parameters
+    ----------
+    depth : how deep the pixels lie within the face's contour, see `depth_within`.
+    unit : the eye separation in pixels.
+    """
+    return smooth((depth / np.float32(unit) + np.float32(REACH + BORDER)) / np.float32(BORDER))
+
+
+def bounds(domain: Bools) -> tuple[slice, slice]:
+    """Rows and columns of a domain, two more on each side."""
+    found = []
+    for axis in (1, 0):
+        at = np.flatnonzero(domain.any(axis=axis))
+        found.append(slice(int(at[0]) - 2, int(at[-1]) + 3))
+    return found[0], found[1]
+
+
+def widened(domain: Bools) -> Bools:
+    """A domain and its neighbours."""
+    wide = domain.copy()
+    wide[1:] |= domain[:-1]
+    wide[:-1] |= domain[1:]
+    wide[:, 1:] |= domain[:, :-1]
+    wide[:, :-1] |= domain[:, 1:]
+    return wide
 
 
 def slit_mask(mesh: WarpMesh, labels: Ints, moved: Places, slits: Slits) -> Planes:

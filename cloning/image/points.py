@@ -7,7 +7,7 @@ pictures have takes part.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -94,6 +94,13 @@ def distance(places: Places, one: str, other: str) -> float:
 def eye_separation(places: Places) -> float:
     """Pixels between the middles of the eyes, from their corners."""
     return float(np.linalg.norm(_middle(places, "3.7", "3.11") - _middle(places, "3.8", "3.12")))
+
+
+def from_eyes(places: Places, offsets: Sequence[tuple[float, float]]) -> Floats:
+    """(n, 2) places so many eye separations to the subject's left and down the face from between the eyes."""
+    eyes = _middle(places, "3.7", "3.11"), _middle(places, "3.8", "3.12")
+    found: Floats = (eyes[0] + eyes[1]) / 2.0 + eye_separation(places) * np.array(offsets) @ _upright(places)
+    return found
 
 
 def to_array(places: Places, names: list[str]) -> Floats:

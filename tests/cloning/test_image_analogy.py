@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from photo_faces import EYES, UNIT, picture, pixels, wrinkle
+from photo_faces import EYES, UNIT, picture, pixels, points, wrinkle
 
 from cloning.image import METHODS, Analogy, AnalogyResult, Method, Picture
 from cloning.image import solve as solving
 from cloning.image.color import to_yuv
+from cloning.image.mask import BORDER, REACH, contour, depth_within
 from fba.errors import LandmarkError
 
 OPEN = {
@@ -87,6 +88,39 @@ def test_what_opens_shows_the_source_unless_it_shall_not() -> None:
     assert not without.teeth
     assert with_teeth.rgb[y, x] == pytest.approx((60, 220, 90), abs=6)
     assert np.abs(without.rgb[y, x].astype(float) - (60, 220, 90)).max() > 40
+
+
+def _chin_over_stripes() -> tuple[np.ndarray, int]:
+    """A face whose chin has a dark edge, before stripes and a plain neck; and the row of the edge in the middle."""
+    rgb = pixels()
+    whole = (slice(0, rgb.shape[0]), slice(0, rgb.shape[1]))
+    depth = depth_within(contour(points()), whole)
+    y, x = np.indices(depth.shape)
+    rgb[depth < 0] = 150.0
+    rgb[(depth < 0) & ((x // 2 % 2 == 0) & (abs(x - EYES[0]) > 0.5 * UNIT))] = 20.0
+    rgb[(abs(depth) <= 1.0) & (y > EYES[1])] = 10.0
+    return rgb, round(points()["2.1"][1])
+
+
+@pytest.mark.parametrize("drop", [0.2, -0.12])
+def test_a_jaw_moves_over_the_neck_and_nothing_else_does(drop: float) -> None:
+    """Stripes around the face stay as they are, and a risen chin leaves no edge behind."""
+    rgb, edge = _chin_over_stripes()
+    source, target = picture(pixels()), picture(rgb)
+    jaw = dict.fromkeys(("2.1", "2.11", "2.12"), (0.0, drop))
+    result = transfer(source, picture(pixels(), jaw), target)
+    still, moved = (contour(points(moves)) for moves in ({}, jaw))
+    reach = (REACH + BORDER) * UNIT
+    whole = (slice(0, rgb.shape[0]), slice(0, rgb.shape[1]))
+    outside = np.maximum(depth_within(still, whole), depth_within(moved, whole)) < -reach
+    assert 0.3 < outside.mean() < 0.8
+    assert (result.rgb[outside] == target.rgb[outside]).all()
+    assert not result.changed[outside].any()
+    column = to_yuv(result.rgb)[0][:, int(EYES[0])]
+    dark = np.flatnonzero(column[edge - 12 : edge + 12] < 60.0) + edge - 12
+    assert dark.size
+    assert dark.mean() == pytest.approx(edge + drop * UNIT, abs=1.5)
+    assert np.ptp(dark) <= 4
 
 
 def test_grey_targets_stay_grey() -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from photo_faces import EYES, SIZE, UNIT, layout, points
+from scipy import ndimage
+from scipy.spatial import Delaunay
 
 from cloning.image.align import fit_similarity_2d
 from cloning.image.color import RGB_FROM_YUV, YUV_FROM_RGB, is_grey, to_rgb, to_yuv
 from cloning.image.eri import correlation, ratio_image
-from cloning.image.mask import face_mask, mouth_opening
-from cloning.image.points import face_points, moved_points, refined, to_array, turned
+from cloning.image.mask import BORDER, REACH, contour, depth_within, face_mask, mouth_opening, region_share
+from cloning.image.points import REQUIRED, face_points, moved_points, refined, to_array, turned
 from cloning.image.warp import Sampler, label_pixels, mapped, ring_around, triangulate
 from cloning.interpolate import TriangleMesh2D
 from fba.errors import LandmarkError
@@ -148,3 +150,26 @@ def test_ratio_images() -> None:
     mixed = 0.8 * face + 0.2 * other
     smoothed = np.std(ratio_image(face, mixed, 50.0)) / np.std((mixed + 4.0) / (face + 4.0))
     assert smoothed < 0.5 < np.std(ratio_image(face, other, 50.0)) / np.std(raw)
+
+
+def test_the_region_of_the_face_covers_its_points_and_fades_around_them() -> None:
+    corners = contour(points())
+    depth = depth_within(corners, WHOLE)
+    share = region_share(depth, UNIT)
+    for x, y in points().values():
+        assert share[round(y), round(x)] == 1.0
+    within = TriangleMesh2D(corners, Delaunay(corners).simplices)
+    rows, columns = np.indices(SIZE[::-1]).reshape(2, -1)
+    inside = within.locate(np.stack([columns, rows], axis=1).astype(float)).inside.reshape(SIZE[::-1])
+    assert (share[inside] == 1.0).all()
+    assert (share[ndimage.distance_transform_edt(~inside) > 1.6 * (REACH + BORDER) * UNIT] == 0.0).all()
+    soft = (share > 0) & (share < 1)
+    assert soft.any()
+    assert not (soft & inside).any()
+
+
+def test_a_contour_without_points_is_that_of_the_mean_face() -> None:
+    bare = {name: points()[name] for name in REQUIRED}
+    full, guessed = (region_share(depth_within(contour(places), WHOLE), UNIT) for places in (points(), bare))
+    both = ((full > 0.5) & (guessed > 0.5)).sum() / ((full > 0.5) | (guessed > 0.5)).sum()
+    assert both > 0.75
