@@ -24,7 +24,7 @@ from fba.feature_points import FeaturePoints
 from fba.findings import Finding
 from fba.scene import FaceScene, Role
 from formats import read, read_face
-from studio.inputs import points_of, scene_of
+from studio.inputs import points_of
 from studio.render import Figure, Renderer, make_renderer
 from studio.sheet import GAP, PAPER, TALL, PosePick, Sheet, UInt8
 
@@ -281,6 +281,7 @@ class _Comparer:
         self.cells: list[Cell] = []
         self.rows: list[_Row] = []
         self.findings: list[Finding] = []
+        self.neutral: dict[str, UInt8] = {}
         self.steps, self.done = 1, 0
 
     def add(self, source: Model) -> None:
@@ -291,6 +292,7 @@ class _Comparer:
             text = f"the source has no tables for all of {', '.join(lacking)}, so it shows what it has"
             self.findings.append(Finding("warning", "motion-missing", text, source.name))
         actor = _Actor.of(face)
+        self.neutral[source.path] = actor.draw(actor.pose(PosePick("neutral")), self.width, self.renderer)
         poses = [actor.pose(pick) for pick in self.picks]
         own = [_Motion.of(actor, pose) for pose in poses]
         itself = [actor.draw(pose, self.width, self.renderer) for pose in poses]
@@ -335,6 +337,8 @@ class _Comparer:
                 for rest in rows[generation - 1 :]:
                     rest.add([self._blank()] * len(self.picks), ["not cloned"] * len(self.picks))
                 return
+            if target.path not in self.neutral:
+                self.neutral[target.path] = actor.draw(actor.pose(PosePick("neutral")), self.width, self.renderer)
             poses = [actor.pose(pick) for pick in self.picks]
             found = [_Motion.of(actor, pose) for pose in poses]
             first = first or found
@@ -368,7 +372,7 @@ class _Comparer:
 
     def grids(self) -> tuple[Sheet, ...]:
         """One grid for each motion."""
-        neutral = [self._neutral(target) for target in self.targets]
+        neutral = [self.neutral.get(target.path, self._blank()) for target in self.targets]
         out = []
         for k, pick in enumerate(self.picks):
             grid = Sheet(pick.caption)
@@ -379,12 +383,6 @@ class _Comparer:
                 grid.add_row(row.label, pictures, captions, space_before=GAP if number else 3 * GAP)
             out.append(grid)
         return tuple(out)
-
-    def _neutral(self, model: Model) -> UInt8:
-        scene = scene_of(model.neutral)
-        figure = Figure(scene, model.points)
-        size = (self.width, round(TALL * self.width))
-        return figure.draw(None, size, figure.camera, self.renderer)
 
 
 def _cell(

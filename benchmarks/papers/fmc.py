@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from benchmarks.papers.cast import Cast
+from benchmarks.papers.pictures import save
 from cloning.align import anchor_ids
 from cloning.antialias import SUPPORT
 from cloning.prepare import PreparedFace
@@ -22,7 +23,7 @@ from studio.comparing import Comparison, Way, compare
 from studio.motions import parse_motions
 from studio.render import Figure, make_renderer
 from studio.render.drawable import Drawable, same_place, smooth_normals
-from studio.sheet import Sheet, UInt8, save_png
+from studio.sheet import Sheet, UInt8
 
 MOTIONS = "surprise,viseme_ih,combination,combination-both-brows"
 FIGURES = ("fmc_11_surprise", "fmc_12_viseme", "fmc_13_combination", "fmc_13_both_brows")
@@ -42,21 +43,21 @@ LIP_COLORS = np.array([[0.82, 0.80, 0.78], [0.85, 0.35, 0.30], [0.30, 0.45, 0.85
 def reproduce(cast: Cast, images: Path, tell: Callable[[str], None]) -> dict[str, str]:
     """Draw the figures into a folder; the tables, by the name of their place in the page."""
     tell("figures 5 and 6")
-    save_png(projection(cast), images / "fmc_5_6_projection.png")
+    save(projection(cast), images / "fmc_5_6_projection.png")
     tell("figure 8")
     sheet, table = antialiasing(cast)
-    sheet.save(images / "fmc_8_antialiasing.png")
+    save(sheet.image(), images / "fmc_8_antialiasing.png")
     tables = {"fmc-8": table}
     tell("figure 9")
-    lip_regions(cast).save(images / "fmc_9_lip_regions.png")
+    save(lip_regions(cast).image(), images / "fmc_9_lip_regions.png")
     tell("figures 11 to 13")
     grids = compare(cast.grid, cast.grid, parse_motions(MOTIONS), (Way("fmc"),), cell=CELL)
     for name, grid in zip(FIGURES, grids.grids, strict=True):
-        grid.save(images / f"{name}.png")
+        save(grid.image(), images / f"{name}.png")
     tables["fmc-grid"] = cells_table(grids)
     tell("all backends on the same motions")
     everyone = compare(cast.grid[:1], cast.grid[1:], parse_motions(MOTIONS), WAYS, cell=CELL)
-    everyone.grids[2].save(images / "fmc_13_backends.png")
+    save(everyone.grids[2].image(), images / "fmc_13_backends.png")
     tables["fmc-backends"] = means_table(everyone)
     tell("generations")
     again = compare(
@@ -67,7 +68,7 @@ def reproduce(cast: Cast, images: Path, tell: Callable[[str], None]) -> dict[str
         generations=GENERATIONS,
         cell=CELL,
     )
-    again.grids[0].save(images / "fmc_generations.png")
+    save(again.grids[0].image(), images / "fmc_generations.png")
     tables["fmc-generations"] = generations_table(again)
     return tables
 

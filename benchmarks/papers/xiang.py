@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from benchmarks.landmarks import Known, errors, faces
 from benchmarks.papers.cast import Cast
+from benchmarks.papers.pictures import save
 from cloning import clone
 from cloning.detect import detect_points
 from cloning.detect.xiang import LANDMARKS
@@ -27,7 +28,7 @@ from studio.inputs import scene_of
 from studio.landmark_sheet import marked
 from studio.render import Figure, make_renderer
 from studio.render.figure import Style
-from studio.sheet import INK, PAPER, PosePick, Sheet, UInt8, save_png
+from studio.sheet import INK, PAPER, PosePick, Sheet, UInt8
 
 KNOWN = ("tri_head", "quad_head", "closed_head", "phenotype_a", "phenotype_b", "generic_neutral_mesh")
 """Faces whose landmarks are known."""
@@ -53,14 +54,14 @@ def reproduce(cast: Cast, images: Path, tell: Callable[[str], None]) -> dict[str
     """Draw the figures into a folder; the tables, by the name of their place in the page."""
     tell("figures 4 and 5")
     found = [_detect(cast, known) for known in faces(cast.folder, KNOWN) if known.truth is not None]
-    save_png(landmarks(cast, found), images / "xiang_4_landmarks.png")
-    save_png(bars(found), images / "xiang_5_errors.png")
+    save(landmarks(cast, found), images / "xiang_4_landmarks.png")
+    save(bars(found), images / "xiang_5_errors.png")
     tables = {"xiang-5": errors_table(found)}
     tell("figure 6")
-    save_png(correspondence(cast), images / "xiang_6_chessboard.png")
+    save(correspondence(cast), images / "xiang_6_chessboard.png")
     tell("figure 7 and table 1")
     sheet, tables["xiang-1"] = expressions(cast)
-    save_png(sheet, images / "xiang_7_expressions.png")
+    save(sheet, images / "xiang_7_expressions.png")
     return tables
 
 
