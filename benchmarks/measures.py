@@ -1,16 +1,16 @@
 """Which measure of ``fba check`` sees which fault: a good face spoilt in known ways, one fault at a time.
 
-    python -m benchmarks.measures [--write]
+    python -m benchmarks.measures [--held-out] [--write]
 
 The shipped source is cloned onto the smallest shipped head, and each spoilt copy is checked beside the good one. A
-fault must fail its own measure, may fail those that by definition see the same, and must fail no other. --write puts
-the tables into docs/checking.md.
+fault must fail its own measure, may fail those that by definition see the same, and must fail no other. --held-out
+checks the faults of `benchmarks.held_out_faults` instead. --write puts the tables into docs/checking.md.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -49,16 +49,17 @@ LIPS = ("lip-gap", "cross-talk", "held-out", *AMOUNT, *SHAPE)
 
 @dataclass(frozen=True)
 class Bench:
-    """The good face, its skin, and its measures."""
+    """The good face, its skin, and the source that it is read beside, with its measures."""
 
     face: AnimatableFace
     skin: CheckedSkin
+    source: AnimatableFace
     measured: Measured
 
     def check(self, spoilt: AnimatableFace) -> dict[str, Verdict]:
         """Every measure of a spoilt copy, beside the good face."""
         mine = measure(spoilt, 0.0, conformance(spoilt), self.skin)
-        return {v.code: v for v in verdicts(mine, self.measured, fidelity(spoilt, self.face))}
+        return {v.code: v for v in verdicts(mine, self.measured, fidelity(spoilt, self.source))}
 
     def near(self, point: str, reach: float) -> Floats:
         """(n, 1) weights of the skin around a feature point: 1 there, smoothly 0 at a reach in eye separations."""
@@ -85,15 +86,23 @@ class Fault:
 
 
 def bench() -> Bench:
-    """Make the good face ready."""
-    path = sample(HEAD)
+    """The good face, which is its own source."""
+    face, skin = good_clone(HEAD, read_face("default"), FAPS)
+    return Bench(face, skin, face, measure(face, 0.0, conformance(face), skin))
+
+
+def good_clone(
+    head: str, source: AnimatableFace, faps: Collection[int] | None = None
+) -> tuple[AnimatableFace, CheckedSkin]:
+    """A clone of a source on a shipped head, and its skin."""
+    path = sample(head)
     scene = read_scene(path)
     beside = landmarks_beside(path)
     points = None if beside is None else read_landmarks(beside, scene)
-    face = clone(read_face("default"), scene, points, faps=FAPS)
+    face = clone(source, scene, points, faps=faps)
     skin = check_skin(face)
     assert skin is not None
-    return Bench(face, skin, measure(face, 0.0, conformance(face), skin))
+    return face, skin
 
 
 def edited(bench: Bench, faps: tuple[int, ...], change: Callable[[Floats, FaceMotion], Floats]) -> AnimatableFace:
@@ -280,14 +289,29 @@ def measure_lines() -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true")
+    parser.add_argument("--held-out", action="store_true")
     options = parser.parse_args()
+    tables = _held_out() if options.held_out else _known()
+    if options.write:
+        put_tables(DOCS, {name: "\n".join(rows) + "\n" for name, rows in tables.items()})
+
+
+def _known() -> dict[str, list[str]]:
     found = matrix(bench())
     table = lines(found)
     print(*table, sep="\n")
     print("\n".join(unseen_and_unrelated(found)) or "every fault is seen by its measure, and by no unrelated one")
-    if options.write:
-        tables = {"measures": measure_lines(), "faults": table}
-        put_tables(DOCS, {name: "\n".join(rows) + "\n" for name, rows in tables.items()})
+    return {"measures": measure_lines(), "faults": table}
+
+
+def _held_out() -> dict[str, list[str]]:
+    from benchmarks.held_out_faults import held_out_bench
+    from benchmarks.held_out_table import dose_lines, outcomes, summary
+
+    found = outcomes(held_out_bench())
+    table = [*dose_lines(found), "", summary(found)]
+    print(*table, sep="\n")
+    return {"held-out": table}
 
 
 if __name__ == "__main__":
