@@ -7,7 +7,7 @@ Pictures are rendered: the shipped source and clones of it on the other shipped 
 expression is the picture of its own clone in that expression, in its own light. Light is turned by turning what the
 shading takes for normals. Points of photographs come from NAME.points.json beside them or from the detector. Errors are
 of the luminance, within the pixels that the mask lets change. PSNR and SSIM are
-those of 8-bit luminances, SSIM with its usual Gaussian window. Times are wall seconds of this process.
+those of 8-bit luminances, SSIM with its usual Gaussian window. Times are those of the processor.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import argparse
 import os
 import resource
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -46,6 +47,7 @@ TARGETS = ("tri_head", "quad_head")
 POSES = {"neutral": 0, "joy": 1, "sadness": 2, "anger": 3, "fear": 4, "disgust": 5, "surprise": 6}
 EXPRESSIONS = tuple(pose for pose in POSES if pose != "neutral")
 SHOWN = ("joy", "anger", "disgust", "surprise")
+LEFT, WHOLE = "target left as it is", "vtc, whole picture"
 Light = tuple[float, float]
 """How far a light is turned: degrees around the head, degrees up."""
 LIGHTS: dict[str, tuple[Light, Light]] = {
@@ -114,89 +116,144 @@ def run(source: Picture, expression: Picture, target: Picture, method: Method, t
     return Analogy(source, target, [expression.points], method, teeth).apply(expression)
 
 
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """One expression of the source on a target, by both methods.
+
+    Attributes
+    ----------
+    expression, target, goal : what the source shows, the target at rest, and its own expression.
+    made : by method.
+    found : errors of luminance; keys are `LEFT`, `WHOLE` and the methods.
+    """
+
+    pose: str
+    expression: UInt8
+    target: UInt8
+    goal: UInt8
+    made: dict[Method, UInt8]
+    found: dict[str, Errors]
+
+
+def transferred(source: Picture, expression: Picture, target: Picture, goal: Picture, pose: str) -> Transfer:
+    """Transfer one expression by both methods and compare with the truth."""
+    results = {m: run(source, expression, target, m) for m in METHODS}
+    where = face_region(results["vtc"])
+    found = {LEFT: errors(target.rgb, goal.rgb, where)}
+    found |= {m: errors(results[m].rgb, goal.rgb, where) for m in METHODS}
+    found[WHOLE] = errors(results["vtc"].rgb, goal.rgb, np.ones_like(where))
+    return Transfer(pose, expression.rgb, target.rgb, goal.rgb, {m: r.rgb for m, r in results.items()}, found)
+
+
+def means(transfers: Sequence[Transfer]) -> dict[str, Errors]:
+    """The mean of each measure over the expressions."""
+    return {key: mean_errors([t.found[key] for t in transfers]) for key in transfers[0].found}
+
+
 def truth(sheets: Path | None) -> None:
     """Figures 12 and 14: clones whose own expression is known, in several lights."""
     for name in TARGETS:
         for light in LIGHTS:
-            sheet = truth_sheet(name, light)
+            transfers = onto_clone(name, light)
+            print(f"{name}, {light}; mean over {len(transfers)} expressions")
+            for label, found in means(transfers).items():
+                print(f"  {label:22} {found}", flush=True)
             if sheets is not None:
-                sheet.save(sheets / f"analogy_truth_{name}_{light.replace(' ', '_')}.png")
+                path = sheets / f"analogy_truth_{name}_{light.replace(' ', '_')}.png"
+                truth_sheet(transfers, f"{name}, {light}: source, VTC, ERI, truth").save(path)
 
 
-def truth_sheet(name: str, light: str, shrink: int = 1) -> Sheet:
-    """Transfer all expressions to one target in one light; tell the errors and draw some of them."""
+def onto_clone(name: str, light: str, poses: Sequence[str] = EXPRESSIONS) -> list[Transfer]:
+    """Transfer expressions to one target in one light."""
     turn, relit = LIGHTS[light]
     own, lit = studio("source"), replace(studio(name), light=turn)
     neutral, target = own.shoot("neutral"), lit.shoot("neutral")
-    rows: dict[str, list[Errors]] = {"target left as it is": [], **{m: [] for m in METHODS}}
-    sheet = Sheet(f"{name}, {light}: source, VTC, ERI, truth")
-    for pose in EXPRESSIONS:
-        goal, expression = lit.shoot(pose), replace(own, light=relit).shoot(pose)
-        made = {m: run(neutral, expression, target, m) for m in METHODS}
-        where = face_region(made["vtc"])
-        rows["target left as it is"].append(errors(target.rgb, goal.rgb, where))
-        for m in METHODS:
-            rows[m].append(errors(made[m].rgb, goal.rgb, where))
-        if pose in SHOWN:
-            pictures = (expression.rgb, made["vtc"].rgb, made["eri"].rgb, goal.rgb)
-            sheet.add_row(pose, [_reduced(rgb, shrink) for rgb in pictures])
-    print(f"{name}, {light}; mean over {len(EXPRESSIONS)} expressions")
-    for label, found in rows.items():
-        print(f"  {label:22} {mean_errors(found)}", flush=True)
+    shifted = replace(own, light=relit)
+    return [transferred(neutral, shifted.shoot(pose), target, lit.shoot(pose), pose) for pose in poses]
+
+
+def truth_sheet(transfers: Sequence[Transfer], title: str, shrink: int = 1) -> Sheet:
+    """Some expressions: the source's, VTC, ERI, the truth."""
+    sheet = Sheet(title)
+    for t in transfers:
+        if t.pose in SHOWN:
+            pictures = (t.expression, t.made["vtc"], t.made["eri"], t.goal)
+            sheet.add_row(t.pose, [reduced(rgb, shrink) for rgb in pictures])
     return sheet
 
 
 def itself(sheets: Path | None) -> None:
     """Figure 15: the source's expression on the source's own neutral face gives back its expression."""
-    sheet = itself_sheet()
+    transfers = onto_itself()
+    for t in transfers:
+        for m in METHODS:
+            print(f"  {t.pose:10} {m}  {t.found[m]}", flush=True)
     if sheets is not None:
-        sheet.save(sheets / "analogy_itself.png")
+        itself_sheet(transfers).save(sheets / "analogy_itself.png")
 
 
-def itself_sheet(shrink: int = 1) -> Sheet:
-    """Map all expressions onto the source itself; tell the errors and draw some of them."""
+def onto_itself() -> list[Transfer]:
+    """Map all expressions onto the source itself."""
     own = studio("source")
     neutral = own.shoot("neutral")
+    goals = {pose: own.shoot(pose) for pose in EXPRESSIONS}
+    return [transferred(neutral, goal, neutral, goal, pose) for pose, goal in goals.items()]
+
+
+def itself_sheet(transfers: Sequence[Transfer], shrink: int = 1) -> Sheet:
+    """Some expressions mapped onto the source itself, and the errors."""
     sheet = Sheet("Onto itself: truth, VTC and its error, ERI and its error (x 8)")
-    for pose in EXPRESSIONS:
-        goal = own.shoot(pose)
-        pictures = [goal.rgb]
-        for m in METHODS:
-            made = run(neutral, goal, neutral, m)
-            found = errors(made.rgb, goal.rgb, face_region(made))
-            print(f"  {pose:10} {m}  {found}", flush=True)
-            off = np.abs(to_yuv(made.rgb)[0] - to_yuv(goal.rgb)[0])
+    for t in transfers:
+        if t.pose not in SHOWN:
+            continue
+        pictures = [t.goal]
+        for made in t.made.values():
+            off = np.abs(to_yuv(made)[0] - to_yuv(t.goal)[0])
             error = np.repeat(np.clip(255.0 - 8.0 * off, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
-            pictures += [made.rgb, error]
-        if pose in SHOWN:
-            sheet.add_row(pose, [_reduced(rgb, shrink) for rgb in pictures])
+            pictures += [made, error]
+        sheet.add_row(t.pose, [reduced(rgb, shrink) for rgb in pictures])
     return sheet
 
 
+@dataclass(frozen=True)
+class Seconds:
+    """Time of the processor: set-up with the first expression, and each further one (median)."""
+
+    unknowns: int
+    first: float
+    further: float
+
+
 def speed(sheets: Path | None) -> None:
-    """311 x 419: set-up, and each further expression, the methods in turns."""
+    """311 x 419: set-up, and each further expression."""
     del sheets
+    for m, taken in seconds().items():
+        print(
+            f"  {m}: {SIZE[0]} x {SIZE[1]}, {taken.unknowns} pixels in the mask; set-up and first expression "
+            f"{taken.first:.2f} s cpu, each further one {taken.further:.3f} s cpu"
+        )
+
+
+def seconds() -> dict[Method, Seconds]:
+    """How long both methods take, in turns."""
     own, other = studio("source"), replace(studio("tri_head"), light=LIGHTS["light from the other side"][0])
     pictures = {pose: own.shoot(pose) for pose in POSES}
     neutral = other.shoot("neutral")
     expressions = [p for k, p in pictures.items() if k != "neutral"]
-    prepared, first, laps = {}, {}, {m: [] for m in METHODS}
+    prepared: dict[Method, Analogy] = {}
+    first: dict[Method, float] = {}
+    laps: dict[Method, list[float]] = {m: [] for m in METHODS}
     for m in METHODS:
-        start, cpu = time.perf_counter(), time.process_time()
+        start = time.process_time()
         prepared[m] = Analogy(pictures["neutral"], neutral, [p.points for p in expressions], m)
         prepared[m].apply(expressions[0])
-        first[m] = (time.perf_counter() - start, time.process_time() - cpu)
+        first[m] = time.process_time() - start
     for expression in 3 * expressions:
         for m in METHODS:
-            start, cpu = time.perf_counter(), time.process_time()
+            start = time.process_time()
             prepared[m].apply(expression)
-            laps[m].append((time.perf_counter() - start, time.process_time() - cpu))
-    for m in METHODS:
-        (setup, setup_cpu), (wall, busy) = first[m], np.median(laps[m], axis=0)
-        print(
-            f"  {m}: {SIZE[0]} x {SIZE[1]}, {prepared[m].unknowns} pixels in the mask; set-up and first expression "
-            f"{setup:.2f} s ({setup_cpu:.2f} cpu), each further one {wall:.3f} s ({busy:.3f} cpu)"
-        )
+            laps[m].append(time.process_time() - start)
+    return {m: Seconds(prepared[m].unknowns, first[m], float(np.median(laps[m]))) for m in METHODS}
 
 
 def large(sheets: Path | None) -> None:
@@ -217,7 +274,8 @@ def large(sheets: Path | None) -> None:
     )
 
 
-def _reduced(rgb: UInt8, shrink: int) -> UInt8:
+def reduced(rgb: UInt8, shrink: int) -> UInt8:
+    """A picture, smaller by a whole number."""
     return np.asarray(Image.fromarray(rgb).reduce(shrink))
 
 

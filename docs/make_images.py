@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from benchmarks.analogy import itself_sheet, truth_sheet
+from benchmarks.analogy import SHOWN, itself_sheet, onto_clone, onto_itself, truth_sheet
 from cloning import clone
 from fat.evaluate import Player
 from fba.high_level import BLEND_MAX
@@ -109,8 +109,10 @@ def combining() -> None:
 
 def analogy() -> None:
     """Expressions on pictures of other heads and on the source itself: docs/analogy.md."""
-    truth_sheet("quad_head", "light from the other side", shrink=2).save(FOLDER / "analogy_truth.png")
-    itself_sheet(shrink=2).save(FOLDER / "analogy_itself.png")
+    name, light = "quad_head", "light from the other side"
+    title = f"{name}, {light}: source, VTC, ERI, truth"
+    truth_sheet(onto_clone(name, light, SHOWN), title, shrink=2).save(FOLDER / "analogy_truth.png")
+    itself_sheet(onto_itself(), shrink=2).save(FOLDER / "analogy_itself.png")
 
 
 def main(*wanted: str) -> None:
