@@ -61,17 +61,25 @@ def coming_through(surface: Surface, seen: Bools, labels: Ints, inner: Ints, off
     reach = places[inner].min(axis=0) - THICK, places[inner].max(axis=0) + THICK
     around = seen & np.all((places >= reach[0]) & (places <= reach[1]), axis=1)
     outer = np.flatnonzero(around).astype(np.int32)
-    # Lining lies behind the skin at rest; both together must go as far as what shows.
-    way = sum(float(np.linalg.norm(offsets[k], axis=1).max(initial=0.0)) for k in (inner, outer))
-    if not len(outer) or way < BEFORE:
+    # Lining lies behind the skin at rest; both together must go as far as what shows, near it.
+    way = np.linalg.norm(offsets, axis=1)
+    if not len(outer) or way[inner].max(initial=0.0) + way[outer].max(initial=0.0) < BEFORE:
         return inner[:0]
+    going = np.concatenate([inner, outer])
+    going = going[way[going] > BEFORE / 4.0]
+    both = np.concatenate([surface.vertices[going], places[going]])
+    low, high = both.min(axis=0) - THICK, both.max(axis=0) + THICK
+    inner = inner[np.all((places[inner] >= low) & (places[inner] <= high), axis=1)]
     away, height = _above(surface, places, outer, inner, labels)
     found: Ints = inner[(away < THICK) & (height > np.maximum(BEFORE, STEEP * away))]
     return found
 
 
 def _above(surface: Surface, places: Floats, outer: Ints, inner: Ints, labels: Ints) -> tuple[Floats, Floats]:
-    """Distance (m,) of the inner vertices from the nearest outer ones on their side, and their height (m,) there."""
+    """Distance (m,) of the inner vertices from the nearest outer ones on their side, and their height (m,) there.
+
+    What is farther away than THICK is infinitely far.
+    """
     from scipy.spatial import cKDTree
 
     away, height = np.full(len(inner), np.inf), np.zeros(len(inner))
@@ -80,7 +88,8 @@ def _above(surface: Surface, places: Floats, outer: Ints, inner: Ints, labels: I
         mine, before = labels[inner] == side, outer[labels[outer] != OPPOSITE[side]]
         if not len(before):
             continue
-        away[mine], near = cKDTree(places[before]).query(places[inner[mine]])
-        nearest = before[near]
-        height[mine] = ((places[inner[mine]] - places[nearest]) * normals[nearest]).sum(axis=1)
+        away[mine], near = cKDTree(places[before]).query(places[inner[mine]], distance_upper_bound=THICK)
+        found = np.isfinite(away[mine])
+        one, other = inner[mine][found], before[np.asarray(near)[found]]
+        height[np.flatnonzero(mine)[found]] = ((places[one] - places[other]) * normals[other]).sum(axis=1)
     return away, height

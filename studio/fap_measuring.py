@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from cloning.lining import coming_through
 from cloning.rigid import fit_rigid
 from fat.conformance import FapConformance, Probe
-from fat.evaluate import Player, Pose
 from fat.face import AnimatableFace
 from fat.fap_quality import FapQuality, independent_motion, mirrored, parted, penetration, stretch
 from fat.quality import asymmetry, flips, mirror_map
 from fat.tables import FaceDefTable
 from fba.amplitudes import amplitudes
-from fba.arrays import Floats, Ints
+from fba.arrays import Bools, Floats, Ints
 from fba.errors import MeshError
-from fba.faps import EXPRESSION_FAP, VISEME_FAP, fap
+from fba.faps import EXPRESSION_FAP, fap
 from fba.high_level import BLEND_MAX
 from fba.scene import Role
 from studio.checked_skin import CheckedSkin, check_skin
+from studio.posing import Poses
 
 SYMMETRIC = 1e-3
 """Eye separations by which the vertices of a symmetric mesh may miss their mirror images."""
@@ -48,15 +49,16 @@ def measure_faps(face: AnimatableFace, skin: CheckedSkin | None = None) -> list[
     A row for each direction of each low-level FAP, each viseme and each expression that has a table, in the order
     of the tables, positive direction first. What cannot be measured on this face is None.
     """
-    measurer = _Measurer(face, skin or check_skin(face))
+    measurer = FapMeasurer(Poses(face), skin or check_skin(face))
     return [row for table in face.tables for row in measurer.rows(table)]
 
 
-class _Measurer:
-    def __init__(self, face: AnimatableFace, skin: CheckedSkin | None) -> None:
-        self.face = face
-        self.player = Player(face, rules=())
-        self.rest = self.player.pose().world_shapes()
+class FapMeasurer:
+    """Measures the tables of a face."""
+
+    def __init__(self, poses: Poses, skin: CheckedSkin | None) -> None:
+        self.face = face = poses.face
+        self.poses, self.rest = poses, poses.rest
         self.points = face.feature_points.positions(face.scene, self.rest)
         self.probe = Probe(face, self.rest)
         self.skin = skin
@@ -72,9 +74,9 @@ class _Measurer:
             yield self._row(table, value, value if high else limit, same)
 
     def _row(self, table: FaceDefTable, value: int, limit: int, borders: list[int]) -> FapQuality:
-        pose = self._pose(table.fap_id, table.high_level_select, value)
-        world = pose.world_shapes()
-        far = pose if limit == value else self._pose(table.fap_id, table.high_level_select, limit)
+        key = (table.fap_id, table.high_level_select, value)
+        pose, world = self.poses.pose(key), self.poses.world(key)
+        far = pose if limit == value else self.poses.pose((table.fap_id, table.high_level_select, limit))
         talk, other = self._cross_talk(table, world)
         row = FapQuality(
             fap_id=table.fap_id,
@@ -96,27 +98,21 @@ class _Measurer:
             return row
         surface = self.skin.surface
         near, wide = (self.skin.offsets(self.face, p) for p in (pose, far))
+        turned = flips(surface.vertices, surface.triangles, near)
         return replace(
             row,
-            flips=flips(surface.vertices, surface.triangles, near),
-            flips_at_limit=flips(surface.vertices, surface.triangles, wide),
+            flips=turned,
+            flips_at_limit=turned if far is pose else flips(surface.vertices, surface.triangles, wide),
             stretch=stretch(surface.vertices, self.skin.hidden_edges, near),
             parted=parted(surface.links, wide),
             through=len(coming_through(surface, self.skin.seen, self.skin.labels, self.skin.lining, near)),
         )
 
-    def _pose(self, fap_id: int, select: int, value: int) -> Pose:
-        if fap_id == VISEME_FAP:
-            return self.player.pose(viseme=(select, 0, value))
-        if fap_id == EXPRESSION_FAP:
-            return self.player.pose(expression=(select, value, 0, 0))
-        return self.player.pose({fap_id: value})
-
     def _own(self, table: FaceDefTable, values: list[int]) -> FapConformance | None:
         if table.fap_id <= EXPRESSION_FAP:
             return None
         definition = fap(table.fap_id)
-        found = [self.probe.measure(definition, v, self._pose(table.fap_id, 1, v).world_shapes()) for v in values]
+        found = [self.probe.measure(definition, v, self.poses.world((table.fap_id, 1, v))) for v in values]
         seen = [f for f in found if f is not None]
         return max(seen, key=lambda f: (not f.passed, f.relative_error), default=None)
 
@@ -133,17 +129,25 @@ class _Measurer:
         if self.skin is None or not self.skin.eyeballs:
             return None
         places = np.concatenate([world[n] for n in self.skin.surface.shapes])
-        before, after = [], []
-        for ball, names in self.skin.eyeballs:
+        after = []
+        for (ball, names), front in zip(self.skin.eyeballs, self._fronts, strict=True):
             rest = np.concatenate([self.rest[n] for n in names])
             way = np.concatenate([world[n] for n in names]) - rest
             rigid = fit_rigid(rest, way[:, None], ball.center)
-            local = ball.rest - ball.center
-            front = local[:, 2] > 0.0
             moved = places[ball.vertices[front]] - ball.center - rigid.shifts[0]
-            before.append(ball.clearance(local[front]))
             after.append(ball.clearance(moved @ rigid.turns[0]))
-        return penetration(np.concatenate(before), np.concatenate(after))
+        return penetration(self._clear_at_rest, np.concatenate(after))
+
+    @cached_property
+    def _fronts(self) -> list[Bools]:
+        """Which of the skin around each eyeball lies before its middle."""
+        return [] if self.skin is None else [b.rest[:, 2] > b.center[2] for b, _ in self.skin.eyeballs]
+
+    @cached_property
+    def _clear_at_rest(self) -> Floats:
+        """(m,) clearance of that skin at rest, in radii."""
+        balls = [] if self.skin is None else [ball for ball, _ in self.skin.eyeballs]
+        return np.concatenate([b.clear_at_rest[front] for b, front in zip(balls, self._fronts, strict=True)])
 
     def _asymmetry(self, table: FaceDefTable, value: int, world: Mapping[str, Floats]) -> float | None:
         if self.sides is None:
@@ -153,7 +157,7 @@ class _Measurer:
             return None
         names, partner = self.sides
         rest = np.concatenate([self.rest[n] for n in names])
-        other = self._pose(fap_id, table.high_level_select, at).world_shapes()
+        other = self.poses.world((fap_id, table.high_level_select, at))
         mine, yours = (np.concatenate([w[n] for n in names]) - rest for w in (world, other))
         return asymmetry(mine, yours, partner)
 

@@ -13,10 +13,11 @@ from fba.errors import LandmarkError
 from fba.faps import faps
 from fba.fapu import FAPU_POINTS, Fapu
 from studio.checked_skin import CheckedSkin
-from studio.fap_measuring import measure_faps
+from studio.fap_measuring import FapMeasurer
 from studio.fidelity import Fidelity
 from studio.measures import BY_CODE
-from studio.motion_measuring import MotionMeasures, measure_motions
+from studio.motion_measuring import MotionMeasurer, MotionMeasures
+from studio.posing import Poses
 from studio.verdicts import Place, Reading, Verdict, judge, judge_motions
 
 VAGUE = ("2.13", "2.14")
@@ -46,8 +47,15 @@ class Measured:
 
 def measure(face: AnimatableFace, neutral: float, own: Sequence[FapConformance], skin: CheckedSkin | None) -> Measured:
     """Measure a face whose tables can be played; `skin` is None for a face without any."""
-    motions = () if skin is None else tuple(measure_motions(face, skin))
-    return Measured(face, neutral, tuple(own), tuple(measure_faps(face, skin)), motions)
+    poses = Poses(face)
+    by_fap = FapMeasurer(poses, skin)
+    by_motion = None if skin is None else MotionMeasurer(poses, skin)
+    rows: list[FapQuality] = []
+    motions: list[MotionMeasures] = []
+    for table in face.tables:  # Table by table, so that both read the same poses.
+        rows += by_fap.rows(table)
+        motions += [] if by_motion is None else by_motion.motions(table)
+    return Measured(face, neutral, tuple(own), tuple(rows), tuple(motions))
 
 
 def verdicts(mine: Measured, theirs: Measured | None, beside: Fidelity | None) -> tuple[Verdict, ...]:

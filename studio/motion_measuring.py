@@ -8,19 +8,19 @@ from functools import cached_property
 
 import numpy as np
 
-from fat.evaluate import Player, Pose
-from fat.face import AnimatableFace
 from fat.fap_quality import DEPTH
 from fat.intersections import crossing
 from fat.lip_contact import lip_depth
 from fat.quality import edge_stretch, roughness
+from fat.tables import FaceDefTable
 from fat.tearing import SLACK, bending, jumps
 from fba.amplitudes import amplitudes
 from fba.arrays import Bools, Floats, Ints
-from fba.faps import EXPRESSION_FAP, VISEME_FAP
+from fba.faps import EXPRESSION_FAP
 from fba.high_level import BLEND_MAX
 from fba.scene import Role
 from studio.checked_skin import CheckedSkin
+from studio.posing import Poses
 
 MOVING = 0.02
 """Share of the largest offset from which a place takes part in a motion."""
@@ -67,41 +67,27 @@ class MotionMeasures:
         return self.name if self.key[0] <= EXPRESSION_FAP else f"{self.name} at {self.key[2]:+d}"
 
 
-def pose_of(player: Player, key: tuple[int, int, int]) -> Pose:
-    """The face in a motion: FAP, select, value."""
-    fap_id, select, value = key
-    if fap_id == VISEME_FAP:
-        return player.pose(viseme=(select, 0, value))
-    if fap_id == EXPRESSION_FAP:
-        return player.pose(expression=(select, value, 0, 0))
-    return player.pose({fap_id: value})
+class MotionMeasurer:
+    """Measures the motions of a face."""
 
-
-def measure_motions(face: AnimatableFace, skin: CheckedSkin) -> list[MotionMeasures]:
-    """Measure all motions of a face whose tables can be played, both directions of each FAP."""
-    measurer = _Measurer(face, skin)
-    return [
-        measurer.motion((table.fap_id, table.high_level_select, value), table.name)
-        for table in face.tables
-        for value in ((BLEND_MAX,) if table.fap_id <= EXPRESSION_FAP else amplitudes()[table.fap_id].values)
-    ]
-
-
-class _Measurer:
-    def __init__(self, face: AnimatableFace, skin: CheckedSkin) -> None:
-        self.face, self.skin = face, skin
-        self.player = Player(face, rules=())
-        self.rest = self.player.pose().world_shapes()
+    def __init__(self, poses: Poses, skin: CheckedSkin) -> None:
+        self.face, self.skin = poses.face, skin
+        self.poses, self.rest = poses, poses.rest
         self.upper, self.lower = (
             np.flatnonzero((skin.labels == k) & skin.seen).astype(np.int32) for k in (UPPER, LOWER)
         )
         self.lip_rest = self._lip_depth(np.zeros_like(skin.surface.vertices))
 
-    def motion(self, key: tuple[int, int, int], name: str) -> MotionMeasures:
+    def motions(self, table: FaceDefTable) -> Iterator[MotionMeasures]:
+        """The motions of a table: both directions of a FAP, a viseme or an expression."""
+        values = (BLEND_MAX,) if table.fap_id <= EXPRESSION_FAP else amplitudes()[table.fap_id].values
+        for value in values:
+            yield self._motion((table.fap_id, table.high_level_select, value), table.name)
+
+    def _motion(self, key: tuple[int, int, int], name: str) -> MotionMeasures:
         """All measures of one motion."""
-        pose = pose_of(self.player, key)
-        world = pose.world_shapes()
-        offsets = self.skin.offsets(self.face, pose)
+        world = self.poses.world(key)
+        offsets = self.skin.offsets(self.face, self.poses.pose(key))
         size = np.linalg.norm(offsets, axis=1)
         moving = size > MOVING * size.max(initial=0.0)
         edges = self.skin.seen_edges

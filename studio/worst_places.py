@@ -9,14 +9,13 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from cloning.lining import coming_through
-from fat.evaluate import Player
 from fat.face import AnimatableFace
 from fat.fap_quality import APART
 from fat.quality import turned_over
 from fba.arrays import Floats, Ints
 from fba.faps import EXPRESSION_FAP, fap
 from studio.checked_skin import CheckedSkin, check_skin
-from studio.motion_measuring import pose_of
+from studio.posing import Poses
 from studio.render import Figure, Renderer, make_renderer
 from studio.render.camera import Camera
 from studio.sheet import Sheet, UInt8
@@ -71,14 +70,14 @@ class Spot:
 class _View:
     def __init__(self, face: AnimatableFace, renderer: Renderer) -> None:
         self.face, self.renderer = face, renderer
-        self.player = Player(face, rules=())
+        self.poses = Poses(face)
         self.figure = Figure.of_face(face)
         self.points = face.feature_points.positions(face.scene)
 
     def draw(self, verdict: Verdict, spot: Spot | None) -> UInt8:
         """The motion, seen from before the worst place; the whole face where the place is not known."""
         motion = verdict.place.motion
-        world = (self.player.pose() if motion is None else pose_of(self.player, motion)).world_shapes()
+        world = self.poses.rest if motion is None else self.poses.world(motion)
         place = None if spot is None else self.place(spot, world)
         camera = self.figure.camera
         if place is not None:
@@ -104,7 +103,7 @@ class _View:
         """The worst place of a measure as a feature point and a way from it, so that another face has it too."""
         point, motion = verdict.place.point, verdict.place.motion
         if point is None and motion is not None and skin is not None:
-            offsets = skin.offsets(self.face, pose_of(self.player, motion))
+            offsets = skin.offsets(self.face, self.poses.pose(motion))
             vertex = verdict.place.vertex
             vertex = _first(verdict.code, skin, offsets) if vertex is None else vertex
             if vertex is not None:
@@ -112,7 +111,7 @@ class _View:
                 near = {k: at - p for k, p in skin.surface.positions.items()}
                 point = min(near, key=lambda k: (float(np.linalg.norm(near[k])), k))
                 own = offsets[vertex]
-                moved = self.face.feature_points.positions(self.face.scene, pose_of(self.player, motion).world_shapes())
+                moved = self.face.feature_points.positions(self.face.scene, self.poses.world(motion))
                 went = (moved[point] - self.points[point]) / self.face.fapu.es0
                 return Spot(point, near[point] + own - went)
         if point is None and motion is not None:
