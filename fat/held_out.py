@@ -39,7 +39,7 @@ def held_out_error(
     off: dict[str, float] = {}
     total = 0.0
     for source, target in motions:
-        for key in source.keys() & target.keys() - NAMED:
+        for key in sorted(source.keys() & target.keys() - NAMED):
             theirs = source[key] / source_es0
             off[key] = off.get(key, 0.0) + float(np.linalg.norm(target[key] / target_es0 - theirs))
             total += float(np.linalg.norm(theirs))
