@@ -8,9 +8,9 @@ from PIL import Image
 
 from studio.sheet import save_png
 
-COLORS = 200
+COLORS = 256
 
 
 def save(image: Image.Image, path: Path) -> None:
-    """Write a PNG of few colours."""
-    save_png(image.quantize(COLORS), path)
+    """Write a PNG of few colours; small coloured spots, such as irises, keep theirs."""
+    save_png(image.quantize(COLORS, method=Image.Quantize.MAXCOVERAGE), path)
