@@ -6,10 +6,11 @@ A shipped head at about 5,000, 20,000 and 85,000 vertices goes through every sta
 timed from file to file; `trimesh` fits a template in the same run, and every deformation transfer program of which
 DIR holds a checkout maps motion in the same run. Seconds are those of the processor, on one thread; each row is a
 process of its own, medians of --runs of them (one at the largest size). FOLDER (as in `benchmarks.fidelity`) holds
-faces whose truth is known; without it there is no peer's fit, and points are detected on the shipped heads alone. --fidelity
-measures all backends against that truth first, which takes a quarter of an hour; without it the bars are read from the
-table that is there. --quick: the two smaller sizes, one run. --write puts the tables into docs/benchmarks.md and the
-numbers into docs/benchmarks.json; --parts measures some parts anew and takes the others from there.
+faces whose truth is known; without it there is no peer's fit, and points are detected on the shipped heads alone.
+--fidelity measures all backends against that truth first, which takes a quarter of an hour; without it the bars are
+read from the table that is there. --quick: the two smaller sizes, one run. --write puts the tables into
+docs/benchmarks.md and the numbers into docs/benchmarks.json; --parts measures some parts anew and takes the others
+from there; --parts "" writes the tables alone.
 """
 
 from __future__ import annotations
@@ -56,12 +57,11 @@ def main() -> None:
         subprocess.run(command, check=True)
     sizes = list(SIZES)[: 2 if options.quick else None]
     runs = 1 if options.quick else options.runs
-    found: dict[str, Any] = {}
-    for part in options.parts.split(","):
+    known = numbers()
+    for part in filter(None, options.parts.split(",")):
         print(f"# {part}", file=sys.stderr, flush=True)
-        found[part] = measure(part, sizes, runs, options.faces, options.peers)
-        known = json.loads(NUMBERS.read_text("utf-8")) if NUMBERS.exists() else {}
-        known |= found | {"machine": machine()}
+        found = measure(part, sizes, runs, options.faces, options.peers)
+        known = {**numbers(), part: found, "machine": machine()} if options.write else {**known, part: found}
         if options.write:
             NUMBERS.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
     document = DOCS / "benchmarks.md"
@@ -69,6 +69,12 @@ def main() -> None:
     print("\n".join(shown.values()))
     if options.write:
         put_tables(document, shown)
+
+
+def numbers() -> dict[str, Any]:
+    """What was measured before."""
+    known: dict[str, Any] = json.loads(NUMBERS.read_text("utf-8")) if NUMBERS.exists() else {}
+    return known
 
 
 def measure(part: str, sizes: list[str], runs: int, faces: Path, peers: Path | None) -> Any:

@@ -27,7 +27,7 @@ def stage_table(stages: Rows) -> str:
             continue
         values = [f"{row[key]:.2f}" for row in stages.values()]
         megabytes = key.replace("write", "MB")
-        if megabytes in first:
+        if megabytes != key and megabytes in first:
             values = [f"{v}, {row[megabytes]:.1f} MB" for v, row in zip(values, stages.values(), strict=True)]
         lines.append(f"| {key} | {' | '.join(values)} | {exponent(stages, key):.2f} |")
     for key in (k for k in first if k.startswith("frames")):
