@@ -13,7 +13,7 @@ import numpy as np
 
 from fat.conformance import FapConformance
 from fat.quality import cross_talk, fap_values
-from fba.arrays import Floats, Ints
+from fba.arrays import Bools, Floats, Ints
 from fba.faps import EXPRESSION_FAP, Fap, fap, faps
 from fba.fapu import Fapu
 from fba.findings import Finding, Severity
@@ -153,10 +153,10 @@ class FapQuality:
             text = f"an edge of hidden skin gets {self.stretch:.1f} times as long, at most {STRETCH_MUST:g}"
             yield "fap-tear", text, self.stretch / STRETCH_MUST
         if self.parted is not None:
-            text = f"{self.parted} vertices come apart along a seam"
+            text = f"vertices that come apart along a seam: {self.parted}"
             yield "fap-seam", text, 1.0 + self.parted if self.parted else 0.0
         if self.through is not None:
-            text = f"{self.through} vertices of the lining come through the skin before it"
+            text = f"vertices of the lining that come through the skin before it: {self.through}"
             yield "fap-lining", text, 1.0 + self.through if self.through else 0.0
         if self.penetration is not None:
             text = (
@@ -230,16 +230,16 @@ def parted(seams: Ints, offsets: Floats) -> int:
     return int(np.count_nonzero(gap > APART))
 
 
-def penetration(before: Floats, after: Floats) -> float:
-    """Percent of vertices that a motion takes into an eyeball.
+def sunk(before: Floats, after: Floats) -> Bools:
+    """Which vertices a motion takes into an eyeball.
 
     Parameters
     ----------
     before, after : (m,) clearance of the vertices in front of it, in radii; negative inside. What is deeper than
         DEPTH at rest is the back of a lid and does not count when it gets deeper.
 
-    >>> penetration(np.array([0.1, 0.0, -0.3, 0.2]), np.array([-0.03, -0.01, -0.4, 0.2]))
-    25.0
+    >>> sunk(np.array([0.1, 0.0, -0.3, 0.2]), np.array([-0.03, -0.01, -0.4, 0.2])).tolist()
+    [True, False, False, False]
     """
-    sunk = (after < np.minimum(before, 0.0) - DEPTH) & (before >= -DEPTH)
-    return 100.0 * float(np.mean(sunk)) if sunk.size else 0.0
+    found: Bools = (after < np.minimum(before, 0.0) - DEPTH) & (before >= -DEPTH)
+    return found

@@ -81,7 +81,7 @@ def _points(face: AnimatableFace) -> Iterator[Finding]:
         yield Finding("warning", "fapu-points", message)
     others = [i for i in standard_feature_points() if i not in face.feature_points and i not in missing]
     if others:
-        message = f"{len(others)} of the standard's 84 feature points are not given: {', '.join(others)}"
+        message = f"not given, of the standard's 84 feature points: {', '.join(others)}"
         yield Finding("info", "feature-points", message)
     for key, point in face.feature_points.items():
         if not _fits(face.scene, point):

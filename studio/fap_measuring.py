@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
 from cloning.lining import coming_through
-from cloning.rigid import fit_rigid
 from fat.conformance import FapConformance, Probe
 from fat.face import AnimatableFace
-from fat.fap_quality import FapQuality, independent_motion, mirrored, parted, penetration, stretch
+from fat.fap_quality import FapQuality, independent_motion, mirrored, parted, stretch
 from fat.quality import asymmetry, flips, mirror_map
 from fat.tables import FaceDefTable
 from fba.amplitudes import amplitudes
-from fba.arrays import Bools, Floats, Ints
+from fba.arrays import Floats, Ints
 from fba.errors import MeshError
 from fba.faps import EXPRESSION_FAP, fap
 from fba.high_level import BLEND_MAX
 from fba.scene import Role
 from studio.checked_skin import CheckedSkin, check_skin
+from studio.eye_depths import EyeDepths
 from studio.posing import Poses
 
 SYMMETRIC = 1e-3
@@ -63,6 +62,7 @@ class FapMeasurer:
         self.probe = Probe(face, self.rest)
         self.skin = skin
         self.sides = _sides(face)
+        self.eyes = EyeDepths(skin, self.rest) if skin is not None and skin.eyeballs else None
 
     def rows(self, table: FaceDefTable) -> Iterator[FapQuality]:
         """One row for each direction."""
@@ -126,28 +126,11 @@ class FapMeasurer:
         return independent_motion(fap(table.fap_id), motion, self.face.fapu, max(steps, default=0.0))
 
     def _penetration(self, world: Mapping[str, Floats]) -> float | None:
-        if self.skin is None or not self.skin.eyeballs:
+        """Percent of the skin before the eyeballs that gets into them."""
+        if self.eyes is None:
             return None
-        places = np.concatenate([world[n] for n in self.skin.surface.shapes])
-        after = []
-        for (ball, names), front in zip(self.skin.eyeballs, self._fronts, strict=True):
-            rest = np.concatenate([self.rest[n] for n in names])
-            way = np.concatenate([world[n] for n in names]) - rest
-            rigid = fit_rigid(rest, way[:, None], ball.center)
-            moved = places[ball.vertices[front]] - ball.center - rigid.shifts[0]
-            after.append(ball.clearance(moved @ rigid.turns[0]))
-        return penetration(self._clear_at_rest, np.concatenate(after))
-
-    @cached_property
-    def _fronts(self) -> list[Bools]:
-        """Which of the skin around each eyeball lies before its middle."""
-        return [] if self.skin is None else [b.rest[:, 2] > b.center[2] for b, _ in self.skin.eyeballs]
-
-    @cached_property
-    def _clear_at_rest(self) -> Floats:
-        """(m,) clearance of that skin at rest, in radii."""
-        balls = [] if self.skin is None else [ball for ball, _ in self.skin.eyeballs]
-        return np.concatenate([b.clear_at_rest[front] for b, front in zip(balls, self._fronts, strict=True)])
+        sunk = self.eyes.sunk(world)
+        return 100.0 * float(np.mean(sunk)) if len(sunk) else 0.0
 
     def _asymmetry(self, table: FaceDefTable, value: int, world: Mapping[str, Floats]) -> float | None:
         if self.sides is None:

@@ -144,7 +144,9 @@ class MotionMeasurer:
             some = some[np.concatenate(moved)[self.skin.surface.triangles[obstacle.watched]].any(axis=1)]
         here = some[self._crossing(obstacle, world, some)] if len(some) else some
         new = here[~np.isin(here, self._at_rest[name])]
-        vertex = int(self.skin.surface.triangles[obstacle.watched[new[0]], 0]) if len(new) else None
+        corners = self.skin.surface.triangles[obstacle.watched[new]].ravel()
+        seen = corners[self.skin.seen[corners]]
+        vertex = int((seen if len(seen) else corners)[0]) if len(new) else None
         return Spot(100.0 * len(new) / len(obstacle.watched), vertex)
 
     def _crossing(self, obstacle: _Obstacle, world: Mapping[str, Floats], some: Ints) -> Ints:

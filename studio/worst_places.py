@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -14,14 +14,19 @@ from fat.fap_quality import APART
 from fat.quality import turned_over
 from fba.arrays import Floats, Ints
 from fba.faps import EXPRESSION_FAP, fap
+from fba.scene import Role
 from studio.checked_skin import CheckedSkin, check_skin
+from studio.eye_depths import EyeDepths
 from studio.posing import Poses
 from studio.render import Figure, Renderer, make_renderer
 from studio.render.camera import Camera
+from studio.render.drawable import Drawable
 from studio.sheet import Sheet, UInt8
 from studio.verdicts import Verdict
 
 CELL = (300, 260)
+OPENED = 0.3
+"""Radius of the hole in what hides a place, in half heights of the close-up: a little more than the ring's."""
 HALF = 0.35
 """Half the height of a close-up, in eye separations: a mouth, or an eye with its brow."""
 RING = 26
@@ -29,6 +34,10 @@ RING = 26
 INK = (214, 40, 40)
 TURN, MOST_TURNED = 35.0, 50.0
 """Degrees by which the camera walks round for each eye separation that a place lies aside, and at most."""
+MEANS = {"fp-error": "fp-error-worst", "flips": "flips-worst"}
+"""Means over all motions are shown in the worst one, which another measure knows."""
+Motion = tuple[int, int, int]
+"""FAP, select, value."""
 MOUTH = "2.2"
 """Where visemes and expressions are looked at when no place is known."""
 
@@ -48,23 +57,29 @@ def worst_places(
     renderer = renderer or make_renderer()
     views = [_View(one, renderer) for one in (face, source) if one is not None]
     skin = check_skin(face) if bad else None
+    given = {v.code: v for v in verdicts}
     for verdict in bad:
-        spot = views[0].spot(verdict, skin)
+        shown = given.get(MEANS.get(verdict.code, ""), verdict)
+        spot = views[0].spot(shown, skin)
         pictures, captions = [], []
         for name, view in zip(("face", "source"), views, strict=False):
-            pictures.append(view.draw(verdict, spot))
+            pictures.append(view.draw(shown.place.motion, spot))
             value = verdict.value if name == "face" else verdict.source
-            captions.append(f"{name}, {verdict.where or 'neutral'}" + ("" if value is None else f": {value:.3g}"))
+            number = "" if value is None else f": {value:.3g}"
+            inside = ", cut open" if spot is not None and spot.inside else ""
+            mean = f"; mean{number}" if shown is not verdict else f"{inside}{number}"
+            captions.append(f"{name}, {shown.where or 'neutral'}{mean}")
         sheet.add_row(f"{verdict.word}  {verdict.measure.title}", pictures, captions)
     return sheet.image()
 
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A place on any face: a feature point, and the way from it in eye separations (3,)."""
+    """A place on any face: a feature point, the way from it in eye separations (3,), and whether skin hides it."""
 
     point: str
     beside: Floats
+    inside: bool = False
 
 
 class _View:
@@ -74,9 +89,8 @@ class _View:
         self.figure = Figure.of_face(face)
         self.points = face.feature_points.positions(face.scene)
 
-    def draw(self, verdict: Verdict, spot: Spot | None) -> UInt8:
+    def draw(self, motion: Motion | None, spot: Spot | None) -> UInt8:
         """The motion, seen from before the worst place; the whole face where the place is not known."""
-        motion = verdict.place.motion
         world = self.poses.rest if motion is None else self.poses.world(motion)
         place = None if spot is None else self.place(spot, world)
         camera = self.figure.camera
@@ -85,7 +99,15 @@ class _View:
             aside = float(place[0]) / self.face.fapu.es0
             x, y, z = place.tolist()
             camera = Camera((x, y, z), half, half, yaw=float(np.clip(TURN * aside, -MOST_TURNED, MOST_TURNED)))
-        image = Image.fromarray(self.figure.draw(world, CELL, camera, self.renderer))
+        drawn = self.figure.drawables(world)
+        if place is not None and spot is not None and spot.inside:
+            skins = [world[s.name] for s in self.face.scene.with_role(Role.SKIN)]
+            radius = OPENED * camera.half_height
+            drawn = [
+                _opened(d, camera, radius) if any(np.array_equal(d.vertices, skin) for skin in skins) else d
+                for d in drawn
+            ]
+        image = Image.fromarray(self.renderer.render(drawn, camera, *CELL))
         if place is not None:
             x, y = CELL[0] // 2, CELL[1] // 2
             ImageDraw.Draw(image).ellipse((x - RING, y - RING, x + RING, y + RING), outline=INK, width=2)
@@ -105,7 +127,7 @@ class _View:
         if point is None and motion is not None and skin is not None:
             offsets = skin.offsets(self.face, self.poses.pose(motion))
             vertex = verdict.place.vertex
-            vertex = _first(verdict.code, skin, offsets) if vertex is None else vertex
+            vertex = self._first(verdict.code, skin, motion, offsets) if vertex is None else vertex
             if vertex is not None:
                 at = skin.surface.vertices[vertex]
                 near = {k: at - p for k, p in skin.surface.positions.items()}
@@ -113,24 +135,39 @@ class _View:
                 own = offsets[vertex]
                 moved = self.face.feature_points.positions(self.face.scene, self.poses.world(motion))
                 went = (moved[point] - self.points[point]) / self.face.fapu.es0
-                return Spot(point, near[point] + own - went)
+                return Spot(point, near[point] + own - went, not skin.seen[vertex])
         if point is None and motion is not None:
             point = fap(motion[0]).feature_points[0] if motion[0] > EXPRESSION_FAP else MOUTH
         return None if point is None else Spot(point, np.zeros(3))
 
+    def _first(self, code: str, skin: CheckedSkin, motion: Motion, offsets: Floats) -> int | None:
+        """A vertex where a motion breaks the rule of a measure that counts, one that is seen if any; None: nowhere."""
+        surface = skin.surface
+        found: Ints = np.zeros(0, dtype=np.int32)
+        if code.startswith("flips"):
+            found = surface.triangles[turned_over(surface.vertices, surface.triangles, offsets)[1], 0]
+        elif code == "seams":
+            gap = np.linalg.norm(offsets[surface.links[:, 0]] - offsets[surface.links[:, 1]], axis=1)
+            found = surface.links[gap > APART, 0]
+        elif code == "in-eyes" and skin.eyeballs:
+            depths = EyeDepths(skin, self.poses.rest)
+            found = depths.vertices[depths.sunk(self.poses.world(motion))]
+        elif code == "lining":
+            found = coming_through(surface, skin.seen, skin.labels, skin.lining, offsets)
+        seen = found[skin.seen[found]]
+        return int((seen if len(seen) else found)[0]) if len(found) else None
 
-def _first(code: str, skin: CheckedSkin, offsets: Floats) -> int | None:
-    """A vertex where a motion breaks the rule of a measure that counts; None if it does so nowhere."""
-    surface = skin.surface
-    found: Ints = np.zeros(0, dtype=np.int32)
-    if code.startswith("flips"):
-        found = surface.triangles[turned_over(surface.vertices, surface.triangles, offsets)[1], 0]
-    elif code == "seams":
-        gap = np.linalg.norm(offsets[surface.links[:, 0]] - offsets[surface.links[:, 1]], axis=1)
-        found = surface.links[gap > APART, 0]
-    elif code == "lining":
-        found = coming_through(surface, skin.seen, skin.labels, skin.lining, offsets)
-    return int(found[0]) if len(found) else None
+
+def _opened(drawable: Drawable, camera: Camera, radius: float) -> Drawable:
+    """Without the triangles that hide the camera's target: those before it, and no farther aside than the radius."""
+    middles = drawable.vertices[drawable.triangles].mean(axis=1) - np.asarray(camera.target)
+    view = middles @ camera.rotation().T
+    hides = (np.hypot(view[:, 0], view[:, 1]) < radius) & (view[:, 2] > 0.0)
+    color = drawable.color
+    if len(color) == len(drawable.triangles) != len(drawable.vertices) and color.ndim == 2:
+        color = color[~hides]
+    decal = None if drawable.decal is None else replace(drawable.decal, uv=drawable.decal.uv[~hides])
+    return replace(drawable, triangles=drawable.triangles[~hides], color=color, decal=decal)
 
 
 __all__ = ["worst_places"]

@@ -36,6 +36,10 @@ COLUMNS = (
 )
 
 MEASURE_COLUMNS = ("measure", ">worst", ">source's", ">fails above", "unit", "", "verdict", "where")
+MEASURES_LEGEND = (
+    "eye sep.: distance of the pupils, 63 mm in an adult; MNS: mouth to nose; IRISD: iris; measures without a unit "
+    "are told beside the source's. Each is explained in docs/checking.md"
+)
 
 
 def check(
@@ -120,6 +124,7 @@ def _draw_worst(face: AnimatableFace, source: AnimatableFace | None, result: Che
 
 def _print(result: CheckResult, worst: bool) -> None:
     from studio.cli.console import console, print_findings, table
+    from studio.grouping import grouped
 
     out = console()
     rows = sorted(result.compared, key=lambda r: -r[0].severity) if worst else result.compared
@@ -134,17 +139,35 @@ def _print(result: CheckResult, worst: bool) -> None:
             out.print("in brackets: the source's, where it differs")
     if result.verdicts:
         table("", MEASURE_COLUMNS, [_measure_cells(v) for v in result.verdicts], out)
+        out.print(MEASURES_LEGEND)
+        if any(v.word == "not judged" for v in result.verdicts):
+            out.print("not judged: give --source, the face that this one was cloned from")
     if result.unmeasured:
         out.print("not measured, for lack of a feature point on a surface: " + ", ".join(result.unmeasured))
-    print_findings((*result.problems, *result.remarks, *result.findings), out)
-    out.print("passed" if result.passed else "FAILED")
+    told = [f for part in (result.problems, result.remarks) for f in grouped(part, result.quality, result.faps)]
+    print_findings((*told, *result.findings), out)
+    if any(f.severity == "warning" for f in told) and result.source_quality is not None:
+        out.print("warnings are about what is worse than on the source; --json names every motion")
+    out.print(_last_line(result))
+
+
+def _last_line(result: CheckResult) -> str:
+    """Whether the face passes, and what to look at even so."""
+    if not result.passed:
+        errors = sum(f.severity == "error" for f in (*result.problems, *result.findings))
+        return f"FAILED: {errors} error{'s' * (errors != 1)}"
+    others = [v.measure.title for v in result.verdicts if v.failed]
+    return "passed" + (f"; no must, but worth a look: {', '.join(others)}" if others else "")
 
 
 def _measure_cells(verdict: Verdict) -> tuple[str, ...]:
     """One line of the table of measures."""
     measure = verdict.measure
     unit = "" if measure.rule == "times" else measure.unit
-    numbers = ["-" if v is None else f"{v:.3g}" for v in (verdict.value, verdict.source, verdict.limit)]
+    numbers = [
+        "-" if v is None else "0" if abs(v) < 1e-9 else f"{v:.3g}"
+        for v in (verdict.value, verdict.source, verdict.limit)
+    ]
     where = verdict.where if verdict.place.point is None else f"{verdict.where} {verdict.place.point}".strip()
     return measure.title, *numbers, unit, "must" if measure.must else "", verdict.word, where
 

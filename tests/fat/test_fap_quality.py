@@ -14,8 +14,8 @@ from fat.fap_quality import (
     independent_motion,
     mirrored,
     parted,
-    penetration,
     stretch,
+    sunk,
 )
 from fba import Fapu, fap, faps
 
@@ -51,9 +51,9 @@ def test_copies_along_a_seam_must_stay_together() -> None:
 def test_penetration_counts_what_gets_into_the_ball() -> None:
     before = np.array([0.05, 0.0, -0.015, -0.3, 0.2, 0.2, 0.2, 0.2])
     after = np.array([-0.03, -0.019, -0.036, -0.9, 0.2, 0.2, 0.2, 0.2])
-    assert penetration(before, after) == 25.0
-    assert penetration(before, before) == 0.0
-    assert penetration(before[:0], after[:0]) == 0.0
+    assert np.flatnonzero(sunk(before, after)).tolist() == [0, 2]
+    assert not sunk(before, before).any()
+    assert not len(sunk(before[:0], after[:0]))
 
 
 def test_every_mirror_is_its_own_inverse_and_reflects_the_motion() -> None:
