@@ -75,11 +75,11 @@ class CheckedSkin:
 
     @cached_property
     def back(self) -> Bools:
-        """(n,) the back of the head, behind the ears; nothing where no ear is given."""
+        """(n,) what can be seen of the back of the head, behind the ears; nothing where no ear is given."""
         ear = self.surface.positions.get(EAR)
         if ear is None:
             return np.zeros(self.surface.vertex_count, dtype=bool)
-        behind: Bools = self.surface.vertices[:, 2] < ear[2] - BEHIND
+        behind: Bools = self.seen & (self.surface.vertices[:, 2] < ear[2] - BEHIND)
         return behind
 
 

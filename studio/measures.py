@@ -155,7 +155,7 @@ MEASURES: tuple[Measure, ...] = (
         0.001,
         0.002,
         True,
-        "largest offset behind the ears in any motion but the ears' own",
+        "largest offset of what can be seen behind the ears in any motion but the ears' own",
         "a hair, .06 mm; what nothing pulls at must not move",
     ),
     Measure(
