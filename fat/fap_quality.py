@@ -122,9 +122,10 @@ class FapQuality:
         """The row's name for messages."""
         return self.name if self.high_level else f"{self.name} at {self.value:+d}"
 
-    def remarks(self) -> list[Finding]:
-        """Differences between the two sides of a symmetric face."""
-        if self.high_level or self.asymmetry is None or self.asymmetry <= ASYMMETRY_MAY:
+    def remarks(self, beside: FapQuality | None = None) -> list[Finding]:
+        """Differences between the two sides of a symmetric face; beside another's row, clearly larger ones."""
+        theirs = 0.0 if beside is None else beside.asymmetry or 0.0
+        if self.high_level or self.asymmetry is None or self.asymmetry <= max(ASYMMETRY_MAY, theirs * (1.0 + MARGIN)):
             return []
         text = f"differs from its mirror image by {100 * self.asymmetry:.1f} %"
         return [Finding("warning", "fap-asymmetry", text, self.where)]

@@ -39,10 +39,12 @@ def held_out_error(
     off: dict[str, float] = {}
     total = 0.0
     for source, target in motions:
-        for key in sorted(source.keys() & target.keys() - NAMED):
-            theirs = source[key] / source_es0
-            off[key] = off.get(key, 0.0) + float(np.linalg.norm(target[key] / target_es0 - theirs))
-            total += float(np.linalg.norm(theirs))
+        keys = sorted(source.keys() & target.keys() - NAMED)
+        theirs, mine = (np.reshape([m[k] for k in keys], (-1, 3)) for m in (source, target))
+        apart = np.linalg.norm(mine / target_es0 - theirs / source_es0, axis=1)
+        for key, value in zip(keys, apart.tolist(), strict=True):
+            off[key] = off.get(key, 0.0) + value
+        total += float(np.linalg.norm(theirs, axis=1).sum()) / source_es0
     worst = max(sorted(off), key=lambda k: off[k], default=None)
     return (sum(off[k] for k in sorted(off)) / total, worst) if total > 0.0 else (0.0, None)
 

@@ -50,7 +50,7 @@ class CheckResult:
         """What is worth telling about the motions, but no reason to fail."""
         out = []
         for row, beside in self.compared:
-            out += row.remarks()
+            out += row.remarks(beside)
             out += [] if beside is None else row.failures(beside)
         told = [v.finding() for v in self.verdicts if v.failed and not v.measure.must and v.code not in TOLD_BY_FAP]
         return (*out, *told)

@@ -68,7 +68,8 @@ def fidelity(face: AnimatableFace, source: AnimatableFace) -> Fidelity | None:
     worst = max(finite, key=lambda k: finite[k], default=None)
     lip = max(lips, key=lambda k: lips[k])
     names = {k: f"{theirs[k].name} at {theirs[k].value}" for k in common}
-    lids = _lid_gap_beyond(face, source)
+    ours, yours = Player(face, rules=()), Player(source, rules=())
+    lids = _lid_gap_beyond(ours, yours)
     held_out, held_out_point = held_out_error(pairs.values(), source.fapu.es0, face.fapu.es0)
     return Fidelity(
         motions=len(common),
@@ -79,8 +80,8 @@ def fidelity(face: AnimatableFace, source: AnimatableFace) -> Fidelity | None:
         lip_gap=lips[lip],
         lip_gap_motion=names[lip],
         lid_gap=None if lids is None else lids[0],
-        flips_mean=_flips(face, source),
-        source_flips_mean=_flips(source, face),
+        flips_mean=_flips(ours, yours),
+        source_flips_mean=_flips(yours, ours),
         held_out=held_out,
         held_out_point=held_out_point,
         fp_error_worst_key=worst,
@@ -93,11 +94,11 @@ def _points(face: AnimatableFace, motion: FaceMotion) -> dict[str, Floats]:
     return feature_point_motion(face.feature_points, motion.offsets)
 
 
-def _flips(face: AnimatableFace, other: AnimatableFace) -> float:
+def _flips(player: Player, other: Player) -> float:
     """Mean share of flipped triangles, in percent, at the normal amplitudes of all motions that both faces have."""
-    keys = {t.key for t in face.tables if t.meshes} & {t.key for t in other.tables if t.meshes}
+    face = player.face
+    keys = {t.key for t in face.tables if t.meshes} & {t.key for t in other.face.tables if t.meshes}
     skins = [(s.name, face.scene.world_vertices(s.name), s.mesh.triangles) for s in face.scene.with_role(Role.SKIN)]
-    player = Player(face)
     values = []
     for pose in (pose for key in sorted(keys) for pose in _normal_poses(player, *key)):
         moved = pose.world_shapes()
@@ -118,14 +119,15 @@ def _normal_poses(player: Player, fap_id: int, select: int) -> Iterator[Pose]:
             yield player.pose({fap_id: value})
 
 
-def _lid_gap_beyond(face: AnimatableFace, source: AnimatableFace) -> tuple[float, str] | None:
+def _lid_gap_beyond(ours: Player, theirs: Player) -> tuple[float, str] | None:
     """How much wider the worse eye stays open after a blink, IRISD, and its upper lid's point."""
     gaps: list[Mapping[str, float]] = []
-    for one in (source, face):
+    for player in (theirs, ours):
+        one = player.face
         if any(one.tables.get(number) is None for number in BLINK):
             return None
         rest = one.feature_points.positions(one.scene)
-        moved = one.feature_points.positions(one.scene, Player(one).pose(BLINK).world_shapes())
+        moved = one.feature_points.positions(one.scene, player.pose(BLINK).world_shapes())
         gaps.append(lid_gap(rest, {k: moved[k] - rest[k] for k in rest}, one.fapu))
     common = sorted(gaps[0].keys() & gaps[1].keys())
     return max(((gaps[1][k] - gaps[0][k], k.split("/")[0]) for k in common), default=None)

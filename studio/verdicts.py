@@ -68,7 +68,7 @@ class Verdict:
     def finding(self) -> Finding:
         """The failure in plain words; an error if it is a must."""
         measure = self.measure
-        beside = "" if self.source is None else f" (the source's {self.source:.3g})"
+        beside = "" if not self.source else f" (the source's {self.source:.3g})"
         unit = "" if measure.rule == "times" else f" {measure.unit}"
         limit = "" if self.limit is None else f", at most {self.limit:.3g}"
         text = f"{measure.title}: {self.value:.3g}{unit}{beside}{limit}"

@@ -35,6 +35,12 @@ COLUMNS = (
     "",
 )
 
+ROWS_LEGEND = (
+    "own error: of the FAP's own feature point; cross-talk: how far another FAP's point moves, in % of the own, and "
+    "which FAP's; flips: % of moving triangles that turn over; limit: where the table ends, and flips there; "
+    "stretch: of hidden skin, times; seams: vertices that come apart; lining: vertices of hidden skin that come "
+    "before the skin; in eyes: % of skin before the eyeballs; mirror: difference of the sides"
+)
 MEASURE_COLUMNS = ("measure", ">worst", ">source's", ">fails above", "unit", "", "verdict", "where")
 MEASURES_LEGEND = (
     "eye sep.: distance of the pupils, 63 mm in an adult; MNS: mouth to nose; IRISD: iris; measures without a unit "
@@ -130,32 +136,30 @@ def _print(result: CheckResult, worst: bool) -> None:
     rows = sorted(result.compared, key=lambda r: -r[0].severity) if worst else result.compared
     if rows:
         table("", COLUMNS, [_cells(row, beside) for row, beside in rows], out)
-        out.print(
-            "flips: % of moving triangles; stretch: of hidden skin, times; seams: vertices that come apart; "
-            "lining: vertices of hidden skin that come before the skin; "
-            "in eyes: % of skin before the eyeballs; mirror: difference of the sides"
-        )
+        out.print(ROWS_LEGEND)
         if result.source_quality is not None:
             out.print("in brackets: the source's, where it differs")
     if result.verdicts:
         table("", MEASURE_COLUMNS, [_measure_cells(v) for v in result.verdicts], out)
         out.print(MEASURES_LEGEND)
-        if any(v.word == "not judged" for v in result.verdicts):
-            out.print("not judged: give --source, the face that this one was cloned from")
+        if result.source_quality is None:
+            out.print("without --source: a clone is judged wholly, and fairly, only beside the face it was cloned from")
     if result.unmeasured:
         out.print("not measured, for lack of a feature point on a surface: " + ", ".join(result.unmeasured))
     told = [f for part in (result.problems, result.remarks) for f in grouped(part, result.quality, result.faps)]
     print_findings((*told, *result.findings), out)
     if any(f.severity == "warning" for f in told) and result.source_quality is not None:
-        out.print("warnings are about what is worse than on the source; --json names every motion")
+        out.print("warnings about motions tell what is worse than on the source; --json has them all")
     out.print(_last_line(result))
 
 
 def _last_line(result: CheckResult) -> str:
     """Whether the face passes, and what to look at even so."""
     if not result.passed:
-        errors = sum(f.severity == "error" for f in (*result.problems, *result.findings))
-        return f"FAILED: {errors} error{'s' * (errors != 1)}"
+        errors = [f.code for f in (*result.problems, *result.findings) if f.severity == "error"]
+        kinds = len(set(errors))
+        of = f", of {kinds} kinds" if 1 < kinds < len(errors) else ""
+        return f"FAILED: {len(errors)} error{'s' * (len(errors) != 1)}{of}"
     others = [v.measure.title for v in result.verdicts if v.failed]
     return "passed" + (f"; no must, but worth a look: {', '.join(others)}" if others else "")
 
@@ -168,7 +172,8 @@ def _measure_cells(verdict: Verdict) -> tuple[str, ...]:
         "-" if v is None else "0" if abs(v) < 1e-9 else f"{v:.3g}"
         for v in (verdict.value, verdict.source, verdict.limit)
     ]
-    where = verdict.where if verdict.place.point is None else f"{verdict.where} {verdict.place.point}".strip()
+    point = "" if verdict.place.point is None else f"point {verdict.place.point}"
+    where = ", ".join(t for t in (verdict.where, point) if t)
     return measure.title, *numbers, unit, "must" if measure.must else "", verdict.word, where
 
 

@@ -131,6 +131,7 @@ def test_sides_that_differ_are_told_but_pass() -> None:
     lopsided = replace(GOOD, asymmetry=0.2)
     assert lopsided.passed
     assert [f.code for f in lopsided.remarks()] == ["fap-asymmetry"]
+    assert not lopsided.remarks(lopsided), "the source has it, too"
     assert GOOD.remarks() == []
     assert replace(lopsided, fap_id=2).remarks() == []
 
