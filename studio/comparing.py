@@ -414,5 +414,5 @@ def _cell(
 
 
 def _caption(cell: Cell) -> str:
-    drift = "" if cell.drift is None else f", drift {cell.drift:.2f}"
-    return f"FP {100 * cell.fp_error:.1f} %, flips {cell.flips:.1f} %{drift}"
+    first = f"FP {100 * cell.fp_error:.1f} %" if cell.drift is None else f"drift {cell.drift:.2f}"
+    return f"{first}, flips {cell.flips:.1f} %"
