@@ -104,7 +104,7 @@ class _View:
             skins = [world[s.name] for s in self.face.scene.with_role(Role.SKIN)]
             radius = OPENED * camera.half_height
             drawn = [
-                _opened(d, camera, radius) if any(np.array_equal(d.vertices, skin) for skin in skins) else d
+                opened(d, camera, radius) if any(np.array_equal(d.vertices, skin) for skin in skins) else d
                 for d in drawn
             ]
         image = Image.fromarray(self.renderer.render(drawn, camera, *CELL))
@@ -158,7 +158,7 @@ class _View:
         return int((seen if len(seen) else found)[0]) if len(found) else None
 
 
-def _opened(drawable: Drawable, camera: Camera, radius: float) -> Drawable:
+def opened(drawable: Drawable, camera: Camera, radius: float) -> Drawable:
     """Without the triangles that hide the camera's target: those before it, and no farther aside than the radius."""
     middles = drawable.vertices[drawable.triangles].mean(axis=1) - np.asarray(camera.target)
     view = middles @ camera.rotation().T
@@ -170,4 +170,4 @@ def _opened(drawable: Drawable, camera: Camera, radius: float) -> Drawable:
     return replace(drawable, triangles=drawable.triangles[~hides], color=color, decal=decal)
 
 
-__all__ = ["worst_places"]
+__all__ = ["opened", "worst_places"]
