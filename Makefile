@@ -15,13 +15,12 @@ test: $(VENV)/.installed-test peers
 	$(BIN)/mypy
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile
 
-# Fidelity and speed tables; see docs/benchmarks.md.
+# One report of fidelity, speed and memory, docs/benchmarks.md, and what it does not hold.
 benchmark: $(VENV)/.installed-test
+	$(BIN)/python -m benchmarks.report --write --fidelity
 	$(BIN)/python -m benchmarks.playback
 	$(BIN)/python -m benchmarks.format_speed
-	$(BIN)/python -m benchmarks.clone_speed
 	$(BIN)/python -m benchmarks.deformation
-	$(BIN)/python -m benchmarks.fidelity --sheets out/fidelity
 
 # Rebuild every shipped face and stream from its origin (needs the package index).
 samples: $(VENV)/.installed-samples

@@ -46,7 +46,7 @@ def stages(size: str) -> dict[str, float]:
     found["make ready"] = told.seconds["target"]
     yours = prepare(head.scene, head.points, "target")
     labels = (mine.labels.values, yours.labels.values)
-    found["template fit"] = seconds(lambda: fit_template(mine.skin, yours.skin, labels=labels), 2)
+    found["template fit, the source's skin"] = seconds(lambda: fit_template(mine.skin, yours.skin, labels=labels), 2)
     found["88 motions corrected"] = _corrected(yours, skin_motions(face, mine).shape[1])
     found["all motions, corrected, with lids and parts"] = told.seconds["motion"]
     found["tables"] = told.seconds["tables"]

@@ -63,18 +63,20 @@ def test_bars_are_read_from_the_table_of_truth() -> None:
 
 
 def test_bars_are_read_from_the_parts() -> None:
-    row = {"template fit": 2.0, "frames/s, head at rest": 3000.0, "read .wrl": 0.2, "motions": 0.1, "memory": 300.0}
+    row = {"frames/s, head at rest": 3000.0, "read .wrl": 0.2, "motions": 0.1, "memory": 300.0}
     other = {**row, "memory": 340.0}
     found = bars.values(
         {
             "clones": [{"backend": "dt", "whole": 11.0}, {"backend": "fit", "whole": 9.0}],
             "stages": {"20k": row},
+            "peers": [{"work": f"template fit, {n} vertices", "ours": s} for n, s in (("4,326", 0.7), ("17,259", 2.3))],
             "transfers": {"fmc": {"20k": row}, "dt": {"20k": other}},
         }
     )
     assert found["whole clone"] == 9.0
     assert found["memory, 20k"] == 340.0
     assert found["motions, dt, 20k"] == 0.1
+    assert (found["fit, 5k"], found["fit, 20k"]) == (0.7, 2.3)
 
 
 def test_growth() -> None:
