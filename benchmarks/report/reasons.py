@@ -34,6 +34,7 @@ REASONS: dict[str, str] = {
     "motions, dt, 20k": (
         "a third is triangular solves of 264 right sides; the rest sets them up and carries the result to the target"
     ),
+    "motions, vtc, 20k": "as DT, with a ring more of neighbours in the matrix",
     "whole clone": (
         "three fifths are finding the feature points, with two fits of its own, and the fit itself; a face "
         "whose points are given needs about 3 s less"
