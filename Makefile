@@ -16,7 +16,7 @@ test: $(VENV)/.installed-test peers
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile
 
 # One report of fidelity, speed and memory, docs/benchmarks.md, and what it does not hold.
-benchmark: $(VENV)/.installed-test
+benchmark: $(VENV)/.installed-benchmark
 	$(BIN)/python -m benchmarks.report --write --fidelity
 	$(BIN)/python -m benchmarks.playback
 	$(BIN)/python -m benchmarks.format_speed
@@ -36,6 +36,10 @@ $(VENV)/.installed: pyproject.toml $(VENV)/bin/python
 $(VENV)/.installed-test: pyproject.toml $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[render,video,test]'
 	@touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-benchmark: pyproject.toml $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[render,video,benchmark]'
+	@touch $@
 
 $(VENV)/.installed-samples: pyproject.toml $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[render,build-samples]'

@@ -98,7 +98,11 @@ def test_a_stream_becomes_the_animation_of_a_gltf(tmp_path: Path) -> None:
     assert "8 tables for 26 vertices, 150 frames at 25/s" in result.stdout
     document = json.loads((tmp_path / "face.gltf").read_text("utf-8"))
     (animation,) = document["animations"]
-    assert {c["target"]["path"] for c in animation["channels"]} == {"weights", "rotation"}
+    assert {c["target"]["path"] for c in animation["channels"]} == {
+        "weights",
+        "rotation",
+        "translation",
+    }  # translation: the jaw
     times = document["accessors"][animation["samplers"][0]["input"]]
     assert (times["count"], times["max"]) == (150, [pytest.approx(149 / 25)])
     result = fba("export", tmp_path / "face.wrl", "-o", tmp_path / "face.ply", "--stream", "demo")
