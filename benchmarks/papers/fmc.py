@@ -19,7 +19,8 @@ from cloning.source import source_motions
 from fat.quality import flips, roughness
 from fba.arrays import Floats, Ints
 from fba.faps import EXPRESSION_FAP, VISEME_FAP
-from studio.comparing import Comparison, Way, compare
+from studio.comparing import compare
+from studio.comparison import Comparison, Way
 from studio.motions import parse_motions
 from studio.render import Figure, make_renderer
 from studio.render.drawable import Drawable, same_place, smooth_normals

@@ -11,7 +11,7 @@ from studio.cli.arguments import AsJson
 from studio.cli.outcome import Outcome, usage
 
 if TYPE_CHECKING:
-    from studio.comparing import Comparison, Way
+    from studio.comparison import Comparison, Way
 
 
 def compare(
@@ -77,7 +77,7 @@ def compare(
 
 def _ways(text: str, as_published: bool) -> list[Way]:
     from cloning import backends
-    from studio.comparing import Way
+    from studio.comparison import Way
 
     known = [b.name for b in backends()]
     names = known if text == "all" else list(dict.fromkeys(n for n in (p.strip() for p in text.split(",")) if n))
