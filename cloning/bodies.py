@@ -16,6 +16,7 @@ from cloning.prepare import PreparedFace
 from cloning.rigid import fit_rigid
 from cloning.similarity import fit_similarity
 from cloning.surface import polygon_edges
+from fat.conformance import RIM_SHARE, widening
 from fba.arrays import Floats, Ints
 from fba.faps import Unit
 from fba.scene import Role
@@ -36,7 +37,10 @@ TOUCHING = 0.06
 BESIDE = 0.05
 """Gums are farther than this from where the source's tongue lies, in eye separations; a tongue's tip touches teeth."""
 
-RIM, PASSES = 0.95, 4
+RING = 0.5
+"""A rim that widens by less than this share of its farthest way is no pupil's."""
+
+PASSES = 4
 COARSER = 1.5
 """A pupil's rim on a coarse eyeball is widened or narrowed by at most this factor to move as far as the source's."""
 
@@ -141,13 +145,14 @@ def eye_mover(source: PreparedFace, target: PreparedFace, mine: Body, yours: Bod
         if soft.any():
             rest = offsets - motion.offsets(mine.vertices, center_s, np.ones(3))
             goals = _at(at_pupil[0], offsets[:, soft]) * ratio
-            wanted = _farthest(iris * rest[:, soft], gaze_s)
+            wanted = iris * _widths(mine.vertices - source.place(pupil), offsets[:, soft], gaze_s)
             out[:, soft] += _exact(
                 iris * np.einsum("nc,nckd->nkd", weights, rest[corners][:, :, soft]),
                 out[:, soft],
                 goals,
                 wanted,
                 at_pupil[1],
+                yours.vertices - target.place(pupil),
                 gaze,
             )
         return out
@@ -155,29 +160,32 @@ def eye_mover(source: PreparedFace, target: PreparedFace, mine: Body, yours: Bod
     return move
 
 
-def _exact(added: Floats, rigid: Floats, goals: Floats, wanted: Floats, rows: Floats, gaze: Floats) -> Floats:
-    """What is added (n, K, 3) to a rigid motion: its rim goes as far as wanted (K,), the pupil's point to its goal.
+def _exact(
+    added: Floats, rigid: Floats, goals: Floats, wanted: Floats, rows: Floats, places: Floats, gaze: Floats
+) -> Floats:
+    """What is added (n, K, 3) to a rigid motion: the rim widens as wanted (K,), the pupil's point is at its goal.
 
     Parameters
     ----------
     goals : (k, K, 3) of the points of rows (k, n); k is 0 where the pupil is no point of the ball.
+    places : (n, 3) vertices from the pupil's point.
     gaze : (3,) unit, across which the rim's way counts.
     """
     for _ in range(PASSES):
-        far = _farthest(added, gaze)
-        added = added * np.clip(wanted / np.maximum(far, 1e-300), 1.0 / COARSER, COARSER)[:, None]
+        far = _widths(places, rigid + added, gaze)
+        rings = np.abs(far) > RING * np.linalg.norm(rigid + added, axis=2).max(axis=0)
+        ratio = np.clip(wanted / np.where(rings, far, 1.0), 1.0 / COARSER, COARSER)
+        added = added * np.where(rings, ratio, 1.0)[:, None]
         for row, goal in zip(rows, goals, strict=False):
             added += row[:, None, None] * (goal - _at(row[None], rigid + added)[0]) / (row @ row)
     return added
 
 
-def _farthest(offsets: Floats, gaze: Floats) -> Floats:
-    """(K,) mean way across the gaze of the offsets (n, K, 3) that are nearly the longest: a rim's."""
+def _widths(places: Floats, offsets: Floats, gaze: Floats) -> Floats:
+    """(K,) by how much the vertices that move nearly as far as any, a rim, go outwards in offsets (n, K, 3)."""
     length = np.linalg.norm(offsets, axis=2)
-    rim = length > RIM * length.max(axis=0)
-    across = np.linalg.norm(offsets - (offsets @ gaze)[:, :, None] * gaze, axis=2)
-    mean: Floats = (across * rim).sum(axis=0) / np.maximum(rim.sum(axis=0), 1)
-    return mean
+    rims = length > RIM_SHARE * length.max(axis=0)
+    return np.array([widening(places[rim], offsets[rim, k], gaze) for k, rim in enumerate(rims.T)])
 
 
 def _at(rows: Floats, offsets: Floats) -> Floats:

@@ -30,7 +30,7 @@ TEST_ANGLE = 10_000
 _LARGEST_ANGLE = 150_000
 """AU; rotations are measured up to here, well below half a turn."""
 
-_RIM_SHARE = 0.95
+RIM_SHARE = 0.95
 """The rim of a pupil goes at least this share of the farthest way: its vertices lie on a ring that is nearly round."""
 
 _SQUINT = 0.8
@@ -206,7 +206,7 @@ class Probe:
         way = np.linalg.norm(moved - rest, axis=1)
         if not way.max() > 0.0:
             return 0.0
-        rim = way > _RIM_SHARE * way.max()
+        rim = way > RIM_SHARE * way.max()
         center = fit_sphere(rest)[0]
         return 2.0 * widening(rest[rim] - self._rest[point], moved[rim] - rest[rim], self._rest[point] - center)
 

@@ -19,6 +19,7 @@ from fba import FaceScene, FeaturePoint, FeaturePoints, Frame, Role, ShapeSet
 from fba.arrays import Floats
 from fba.errors import CloningError, LandmarkError
 from formats import read_scene
+from formats.landmarks import read_landmarks
 from samples import sample
 
 FEW = (3, 5, 12, 19, 31)
@@ -75,6 +76,18 @@ def test_tongue_and_pupils_move_exactly_too(cloned: tuple[AnimatableFace, CloneR
         assert results[number].passed, results[number]
     for number in (29, 30):
         assert results[number].relative_error < 0.1, results[number]
+
+
+def test_pupils_grow_right_where_their_points_are_beside_the_middle(source: AnimatableFace) -> None:
+    """A detected point need not lie in the middle of the ring: the ring grows by IRISD all the same."""
+    path = sample("faces/tri_head.obj")
+    scene = read_scene(path)
+    points = dict(read_landmarks(path.with_suffix(".fps.json"), scene))
+    for key in ("3.5", "3.6"):
+        at = points[key]
+        points[key] = FeaturePoint(at.shape, (at.vertices[1],), (1.0,))
+    face = clone(source, scene, FeaturePoints(points), faps=(29, 30))
+    assert [row.passed for row in conformance(face)] == [True, True]
 
 
 def test_neutral_is_untouched(
