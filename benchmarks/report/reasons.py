@@ -4,8 +4,7 @@ from __future__ import annotations
 
 REASONS: dict[str, str] = {
     "own feature point, %": (
-        "pupils of `tri_head` when dilated (FAPs 29, 30): 4.5 of 420 units; no other FAP of the three heads "
-        "is off by more than .1 % and one unit"
+        "rims of pupils and lids of coarse heads: single vertices have to stand for a ring or an edge"
     ),
     "feature points": (
         "the heads of 2,600 to 5,300 vertices, where feature points share triangles with others that move differently"
