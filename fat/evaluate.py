@@ -49,6 +49,13 @@ class Pose:
     local: dict[str, Floats]
     matrices: Mapping[str, Floats]
 
+    def mesh_offsets(self) -> dict[str, Floats]:
+        """What meshes do, without the Transforms: shape name -> offsets (n, 3) in the world directions of rest."""
+        return {
+            s.name: (self.local[s.name] - s.mesh.vertices) @ self.scene.world_matrix(s.name)[:3, :3].T
+            for s in self.scene.shapes
+        }
+
     def world_shapes(self) -> dict[str, Floats]:
         """Shape name -> (n, 3) vertices in world coordinates, inside axes."""
         return {name: _transformed(vertices, self.matrices[name]) for name, vertices in self.local.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -35,7 +34,6 @@ class CheckedSkin:
     seen : (n,) what can be seen on the neutral face.
     labels : (n,) lips and lids, see `cloning.labels`.
     lining : (m,) vertices that line the inside, see `cloning.lining`.
-    linear : shape name -> (3, 3) from its local directions to the world's.
     eyeballs : the eyeballs that are there, each with the names of its shapes.
     """
 
@@ -43,16 +41,11 @@ class CheckedSkin:
     seen: Bools
     labels: Ints
     lining: Ints
-    linear: Mapping[str, Floats]
     eyeballs: list[tuple[Ball, list[str]]]
 
     def offsets(self, face: AnimatableFace, pose: Pose) -> Floats:
         """(n, 3) offsets without what transforms do, in eye separations."""
-        parts = []
-        for name in self.surface.shapes:
-            moved = pose.local[name] - face.scene.shape(name).mesh.vertices
-            parts.append(moved @ self.linear[name].T)
-        offsets: Floats = np.concatenate(parts) / face.fapu.es0
+        offsets: Floats = self.surface.join(pose.mesh_offsets()) / face.fapu.es0
         return offsets
 
     @cached_property
@@ -93,11 +86,10 @@ def check_skin(face: AnimatableFace) -> CheckedSkin | None:
         return None
     shown = whole.split(visible(whole).astype(np.float64))
     seen = np.concatenate([shown[name] > 0.0 for name in names])
-    linear = {name: face.scene.world_matrix(name)[:3, :3] for name in names}
     labels = label(surface)
     prepared = PreparedFace(face.scene, face.feature_points, face.fapu, surface, labels, ())
     lined = lining(surface, seen, labels.values)
-    return CheckedSkin(surface, seen, labels.values, lined, linear, _eyeballs(face, prepared))
+    return CheckedSkin(surface, seen, labels.values, lined, _eyeballs(face, prepared))
 
 
 def _eyeballs(face: AnimatableFace, prepared: PreparedFace) -> list[tuple[Ball, list[str]]]:

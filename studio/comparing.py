@@ -73,13 +73,6 @@ class _Actor:
     def pose(self, pick: PosePick) -> Pose:
         return self.player.pose(pick.faps, pick.viseme, pick.expression)
 
-    def offsets(self, pose: Pose) -> dict[str, Floats]:
-        """What meshes do, without the transforms: shape name -> world offsets (n, 3)."""
-        scene = self.face.scene
-        return {
-            s.name: (pose.local[s.name] - s.mesh.vertices) @ scene.world_matrix(s.name)[:3, :3].T for s in scene.shapes
-        }
-
     def draw(self, pose: Pose, width: int, renderer: Renderer) -> UInt8:
         size = (width, round(TALL * width))
         return self.figure.draw(pose.world_shapes(), size, self.figure.camera, renderer)
@@ -97,7 +90,7 @@ class _Motion:
     @classmethod
     def of(cls, actor: _Actor, pose: Pose) -> _Motion:
         face, skin = actor.face, actor.skin
-        offsets = actor.offsets(pose)
+        offsets = pose.mesh_offsets()
         moved = skin.join(offsets) / face.fapu.es0
         return cls(
             fap_values(feature_point_motion(face.feature_points, offsets), face.fapu),
