@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+# Most people have no numba: tests go the numpy way, but for those of the compiled loops.
+os.environ.setdefault("FBA_FAST", "0")
+
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 

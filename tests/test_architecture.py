@@ -74,7 +74,7 @@ def test_no_two_modules_import_each_other() -> None:
 
 @pytest.mark.parametrize(
     ("statement", "heavy"),
-    [("import fba", ("scipy", "pxr", "PIL")), ("import studio.cli.app", ("scipy", "pxr", "PIL"))],
+    [("import fba", ("scipy", "pxr", "PIL", "numba")), ("import studio.cli.app", ("scipy", "pxr", "PIL", "numba"))],
 )
 def test_importing_is_light(statement: str, heavy: tuple[str, ...]) -> None:
     code = f"import sys; {statement}; print([m for m in {heavy!r} if m in sys.modules])"
