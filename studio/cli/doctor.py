@@ -36,6 +36,7 @@ def doctor(as_json: AsJson = False) -> None:
         _source(),
         _egl(),
         _ffmpeg(),
+        _numba(),
         detector_check(),
         _program("MP4Box", "checks BT files against a second implementation; part of GPAC"),
         _program("chromium", "checks VRML files in a browser: apt-get install chromium"),
@@ -83,6 +84,13 @@ def _ffmpeg() -> Check:
     except PackageNotFoundError:
         found = shutil.which("ffmpeg")
         return Check("mp4 output", found is not None, False, found or "pip install 'fba-toolkit[video]'")
+
+
+def _numba() -> Check:
+    try:
+        return Check("compiled loops", True, False, f"numba {version('numba')}")
+    except PackageNotFoundError:
+        return Check("compiled loops", False, False, "faster clones and playback: pip install 'fba-toolkit[fast]'")
 
 
 def detector_check() -> Check:

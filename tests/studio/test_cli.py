@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import re
@@ -256,7 +257,9 @@ def test_export_to_every_format_and_back(cloned: Path, tmp_path: Path) -> None:
 
 def test_doctor_finds_the_shipped_face() -> None:
     document = json.loads(fba("doctor", "--json").stdout)
-    assert {c["name"]: c["ok"] for c in document["checks"]}["shipped source face"]
+    found = {c["name"]: c["ok"] for c in document["checks"]}
+    assert found["shipped source face"]
+    assert found["compiled loops"] == (importlib.util.find_spec("numba") is not None)
 
 
 @pytest.mark.parametrize("name", ["out.npz", "out", "out.usda"])
