@@ -3,13 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from fba.arrays import Bools, Floats, Ints
-from fba.feature_points import FeaturePoint
+from fba.fapu import Fapu
+from fba.feature_points import FeaturePoint, FeaturePoints
+from fba.scene import FaceScene
 from samples.build.geodesic import distances
 from samples.build.head import Head
+
+
+class PointedHead(Protocol):
+    """A head with feature points, whose skin is the shape "skin"."""
+
+    @property
+    def scene(self) -> FaceScene: ...
+
+    @property
+    def points(self) -> FeaturePoints: ...
+
+    @property
+    def positions(self) -> dict[str, Floats]: ...
+
+    @property
+    def fapu(self) -> Fapu: ...
 
 
 @dataclass(frozen=True)
@@ -68,7 +87,7 @@ class Line:
         return FeaturePoint("skin", tuple(v for v, _ in kept), tuple(w for _, w in kept))
 
 
-def side_mask(head: Head, edge: Edge) -> Bools:
+def side_mask(head: PointedHead, edge: Edge) -> Bools:
     """Skin vertices that belong to the edge's side: nearer along the surface to its own feature points."""
     mesh = head.scene.shape("skin").mesh
     own, other = (distances(mesh, [head.points[k] for k in keys]).min(axis=0) for keys in (edge.seeds, edge.rivals))

@@ -18,7 +18,7 @@ from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.mesh import PolyMesh
 from fba.scene import FaceScene, Shape
 from fba.shapes import ShapeSet
-from samples.build.contact import LIDS, LIPS, side_mask, surface_edge
+from samples.build.contact import LIDS, LIPS, PointedHead, side_mask, surface_edge
 from samples.build.head import Head, build_head, macro, mean_mixture
 from samples.build.makehuman import MakeHuman
 from samples.build.neutral import neutral
@@ -65,8 +65,12 @@ class KnownHead:
     units: Mapping[str, Mapping[str, Floats]] = field(repr=False)
 
     @cached_property
+    def positions(self) -> dict[str, Floats]:
+        return self.points.positions(self.scene)
+
+    @cached_property
     def fapu(self) -> Fapu:
-        return Fapu.from_feature_points(self.points.positions(self.scene))
+        return Fapu.from_feature_points(self.positions)
 
     def shapes(self, names: Iterable[str] = BENCHMARK_UNITS) -> ShapeSet:
         """The units as morph targets in the scene's own vertex order."""
@@ -107,9 +111,14 @@ def known(head: Head, names: Iterable[str] = BENCHMARK_UNITS) -> KnownHead:
 
 
 def decimated(head: Head, vertices: int = 2600, names: Iterable[str] = BENCHMARK_UNITS) -> KnownHead:
+    """A MakeHuman head in another topology, see `in_other_topology`."""
+    return in_other_topology(known(head, names), vertices)
+
+
+def in_other_topology(head: KnownHead, vertices: int) -> KnownHead:
     """The same head as triangles in another topology, with about this many vertices, and the truth on it.
 
-    Lashes are left out. Lip and lid feature points stay on their own side.
+    Lashes are left out. Lip and lid feature points stay on their own side. The skin is the shape "skin".
     """
     shapes: list[Shape] = []
     places: dict[str, Places] = {}
@@ -121,9 +130,13 @@ def decimated(head: Head, vertices: int = 2600, names: Iterable[str] = BENCHMARK
         mesh = simplified(shape.mesh, int(share * vertices))
         places[shape.name] = nearest_facing(mesh.vertices, mesh.vertex_normals(), shape.mesh)
         shapes.append(Shape(shape.name, mesh, shape.role, shape.materials[:1]))
-    scene = FaceScene(tuple(shapes), meters_per_unit=0.1, name=f"{head.name}_decimated")
+    unit = head.scene.meters_per_unit
+    scene = FaceScene(tuple(shapes), meters_per_unit=unit, name=f"{head.scene.name}_decimated")
     points = FeaturePoints(transfer_points(head, scene, places))
-    units = {name: {shape: place.carry(head.unit(name)[shape]) for shape, place in places.items()} for name in names}
+    units = {
+        name: {shape: place.carry(offsets[shape]) for shape, place in places.items()}
+        for name, offsets in head.units.items()
+    }
     return KnownHead(scene, points, units)
 
 
@@ -141,7 +154,7 @@ def simplified(mesh: PolyMesh, vertices: int) -> PolyMesh:
     return PolyMesh.from_faces(np.asarray(out, dtype=np.float64)[used], new[np.asarray(faces)])
 
 
-def transfer_points(head: Head, scene: FaceScene, places: Mapping[str, Places]) -> dict[str, FeaturePoint]:
+def transfer_points(head: PointedHead, scene: FaceScene, places: Mapping[str, Places]) -> dict[str, FeaturePoint]:
     """Feature points of a head on a scene whose vertices lie at `places` of the head's shapes.
 
     Points of lips and lids stay on their own side; those on a rim are placed on the rim of the new surface.
@@ -161,7 +174,7 @@ def transfer_points(head: Head, scene: FaceScene, places: Mapping[str, Places]) 
     return found
 
 
-def _transfer(head: Head, scene: FaceScene, key: str, allowed: Bools | None) -> FeaturePoint:
+def _transfer(head: PointedHead, scene: FaceScene, key: str, allowed: Bools | None) -> FeaturePoint:
     point = head.points[key]
     if point.shape is None:
         return point
