@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.fidelity import SHARED, read_kit_points
-from benchmarks.profiles import RPM_POINTS, arkit_shapes
+from benchmarks.kits import SHARED, arkit_shapes, read_kit_points
+from benchmarks.profiles import RPM_POINTS
 from cloning import backends, clone_shapes
 from cloning.prepare import PreparedFace, prepare
 from cloning.visibility import visible

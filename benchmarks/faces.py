@@ -24,7 +24,8 @@ from time import process_time
 import numpy as np
 from PIL import Image
 
-from benchmarks.fidelity import back_of_head, targets
+from benchmarks.fidelity import back_of_head
+from benchmarks.known_faces import targets
 from benchmarks.landmarks import SHARED, errors
 from cloning import CloneReport, clone_with_report
 from cloning.backends import DEFAULT_BACKEND

@@ -6,36 +6,35 @@
 A MakeHuman head is cloned onto two other phenotypes, as they are and decimated to another topology, where its own
 units are the truth (as they are, and scaled by FAPUs), and onto ICT-FaceKit, where no truth exists. The head is a mean
 phenotype with MakeHuman's own units, so that nothing but cloning differs from the truth; or the shipped source's,
-whose units are smoothed. Each backend's default mode stands beside the published one. --write puts the tables into
-docs/backends and, when all backends are measured, into docs/benchmarks.md.
+whose units are smoothed. ICT-FaceKit's generic face is cloned onto another of its identities, as it is and decimated,
+where its own shapes are the truth. Each backend's default mode stands beside the published one. --write puts the
+tables into docs/backends and, when all backends are measured, into docs/benchmarks.md.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks import identities
+from benchmarks.kits import SHARED
+from benchmarks.known_faces import Target, other_identities, targets
 from cloning import CloneReport, backends, clone_shapes
 from cloning.fmc import scale_field
 from cloning.prepare import PreparedFace, prepare
 from cloning.visibility import visible
 from fba.arrays import Floats
-from fba.feature_points import FeaturePoint, FeaturePoints
-from fba.scene import FaceScene
 from fba.shapes import ShapeSet
-from formats import read_scene
 from samples.build.arkit_docs import put_tables
 from samples.build.makehuman import open_makehuman
-from samples.build.phenotypes import KnownHead, decimated, known, phenotype_a, phenotype_b, phenotype_mean
+from samples.build.phenotypes import KnownHead, known, phenotype_mean
 from samples.build.source import source_head
 from studio.render.figure import Figure
 
-SHARED = Path(__file__).resolve().parents[2] / "shared"
 LIPS = (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))
 LIDS = {"eyeBlinkLeft": ("3.1", "3.3"), "eyeBlinkRight": ("3.2", "3.4")}
 MOVING = 0.01
@@ -58,14 +57,26 @@ SOURCES = {"mean": phenotype_mean, "shipped": source_head}
 FACE_UNITS = ("eyeBlinkLeft", "mouthSmileLeft", "jawOpen", "browInnerUp", "mouthFunnel", "cheekPuff")
 
 
-@dataclass(frozen=True)
-class Target:
-    """A face to clone onto, and the truth where it is known."""
+class Source:
+    """A face that is cloned, with its shapes."""
 
-    name: str
-    scene: FaceScene
-    points: FeaturePoints
-    truth: ShapeSet | None
+    def __init__(self, head: KnownHead) -> None:
+        self.head, self.shapes = head, head.shapes()
+        self.prepared = prepare(head.scene, head.points, "source")
+        print_row("source", "itself", own_measures(self.prepared, self.shapes))
+
+    def cloned(self, target: Target, backend: str, as_published: bool) -> tuple[ShapeSet, dict[str, float]]:
+        """The shapes on a target, and the measures of this clone."""
+        cloned, report = clone_shapes(
+            self.head.scene,
+            self.head.points,
+            self.shapes,
+            target.scene,
+            target.points,
+            backend=backend,
+            as_published=as_published,
+        )
+        return cloned, measure(self.prepared, self.shapes, target, cloned, report)
 
 
 def main() -> None:
@@ -79,25 +90,15 @@ def main() -> None:
     parser.add_argument("--backends", default=",".join(b.name for b in backends()), help="names, by commas")
     options = parser.parse_args()
     makehuman = open_makehuman(options.makehuman)
-    source = known(SOURCES[options.source](makehuman))
-    shapes = source.shapes()
-    prepared = prepare(source.scene, source.points, "source")
+    sources = {False: Source(known(SOURCES[options.source](makehuman)))}
     rows = []
     print(f"{'target':18}{'mode':16}" + "".join(f"{name:>11}" for name in HEADINGS))
-    print_row("source", "itself", own_measures(prepared, shapes))
-    for target in targets(makehuman, options.faces):
+    for target in (*targets(makehuman, options.faces), *other_identities(options.faces)):
+        if target.own and True not in sources:
+            sources[True] = Source(identities.generic(options.faces))
         for backend in options.backends.split(","):
             for as_published in (False, True):
-                cloned, report = clone_shapes(
-                    source.scene,
-                    source.points,
-                    shapes,
-                    target.scene,
-                    target.points,
-                    backend=backend,
-                    as_published=as_published,
-                )
-                row = measure(prepared, shapes, target, cloned, report)
+                cloned, row = sources[target.own].cloned(target, backend, as_published)
                 mode = f"{backend} published" if as_published else backend
                 print_row(target.name, mode, row)
                 rows.append({"target": target.name, "backend": backend, "published": as_published, **row})
@@ -112,43 +113,6 @@ def main() -> None:
         for name in measured:
             table = {"fidelity image" if name == "vtc-image" else "fidelity": backend_table(rows, name)}
             put_tables(DOCS / "backends" / f"{PAGES.get(name, name)}.md", table)
-
-
-def targets(makehuman: object, faces: Path) -> Iterator[Target]:
-    """Two phenotypes in another topology, their source topology, and ICT-FaceKit where the folder is there."""
-    for name, build in (("phenotype_a", phenotype_a), ("phenotype_b", phenotype_b)):
-        head = build(makehuman)  # type: ignore[arg-type]
-        for kind, made in (("", known(head)), ("_dec", decimated(head))):
-            yield Target(name + kind, made.scene, made.points, _truth(made))
-    mesh = faces / "faces" / "ict-facekit" / "generic_neutral_mesh.obj"
-    if mesh.exists():
-        scene = read_scene(mesh)
-        yield Target("ict", scene, read_kit_points(faces / "landmarks" / "ict.json", scene), None)
-
-
-def _truth(head: KnownHead) -> ShapeSet:
-    return head.shapes()
-
-
-def read_kit_points(path: Path, scene: FaceScene) -> FeaturePoints:
-    """Feature points given as three vertices of the file and their weights."""
-    order = scene.file_order()
-    size = scene.vertex_count
-    shape_of = np.empty(size, dtype=object)
-    place_of = np.zeros(size, dtype=int)
-    for name, ids in order.items():
-        shape_of[ids] = name
-        place_of[ids] = np.arange(len(ids))
-    points = {}
-    for key, row in json.loads(path.read_text()).items():
-        if "face" in row:
-            names = [shape_of[v] for v in row["face"]]
-            points[key] = FeaturePoint(
-                names[int(np.argmax(row["bary"]))], tuple(int(place_of[v]) for v in row["face"]), tuple(row["bary"])
-            )
-        else:
-            points[key] = FeaturePoint.free(np.array(row["point"]))
-    return FeaturePoints(points)
 
 
 HEADINGS = (

@@ -17,9 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from authoring.author import author
-from authoring.names import unit_name
-from benchmarks.fidelity import SHARED, read_kit_points
-from fat.profiles import ARKIT, profile_table
+from benchmarks.kits import SHARED, arkit_shapes, read_kit_points
+from fat.profiles import profile_table
 from fba.arrays import Floats
 from fba.feature_points import FeaturePoints
 from fba.scene import FaceScene, Role
@@ -27,7 +26,6 @@ from fba.shapes import ShapeSet
 from formats import read_scene
 from formats.landmarks import read_landmarks
 from formats.shapes import read_shapes
-from samples.build.arkit_anatomy import mirror_shape
 from samples.build.arkit_docs import put_tables
 from samples.build.arkit_fit import Residual, residual, shape_to_faps
 from samples.build.arkit_table import DATA, DOCS, FORWARD, read_rows, tables_in_words, write_rows
@@ -81,17 +79,6 @@ def _whole(known: KnownShapes, name: str, offsets: Floats) -> bool:
     elif name == "tongueOut":
         part = known.of_role(Role.TONGUE)
     return float(np.abs(offsets[part]).max(initial=0.0)) > STILL * known.face.fapu.es0
-
-
-def arkit_shapes(names: tuple[str, ...], deltas: Floats) -> dict[str, Floats]:
-    """The shapes under ARKit's names; halves of one shape are added."""
-    total: dict[str, Floats] = {}
-    for name, delta in zip(names, deltas, strict=True):
-        unit = unit_name(name)
-        if unit is not None:
-            whole = unit if unit in ARKIT else unit.removesuffix("Left").removesuffix("Right")
-            total[whole] = total.get(whole, 0.0) + delta
-    return {name: total[name] for name in ARKIT if name in total and mirror_shape(name) in total}
 
 
 def publish(name: str, found: dict[str, Residual]) -> None:

@@ -13,7 +13,8 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from benchmarks.fidelity import DOCS, SHARED
+from benchmarks.fidelity import DOCS
+from benchmarks.kits import SHARED
 from benchmarks.papers import fmc, vtc, xiang
 from benchmarks.papers.cast import Cast
 from samples.build.arkit_docs import put_tables

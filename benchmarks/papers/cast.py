@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 from authoring.author import author
-from benchmarks.fidelity import read_kit_points
+from benchmarks.kits import read_kit_points
 from cloning.prepare import PreparedFace, prepare
 from fat.face import AnimatableFace
 from fat.rig import unrig
