@@ -1,10 +1,10 @@
-"""What becomes of the faults of `benchmarks.held_out_faults`, as a table and in one sentence."""
+"""What becomes of faults in several strengths (`benchmarks.doses`), as a table and in one sentence."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from benchmarks.held_out_faults import DOSES, Dose
+from benchmarks.doses import Dose
 from benchmarks.measures import Bench
 from studio.verdicts import Verdict
 
@@ -12,20 +12,20 @@ Outcomes = Mapping[tuple[str, float], Mapping[str, Verdict]]
 """(fault, strength) -> measure -> verdict; the good face is ("nothing", 0)."""
 
 
-def outcomes(b: Bench) -> Outcomes:
+def outcomes(b: Bench, doses: Sequence[Dose]) -> Outcomes:
     """Check the good face, and each fault in each strength."""
     found = {("nothing", 0.0): b.check(b.face)}
-    return found | {(d.name, s): b.check(d.spoil(b, s)) for d in DOSES for s in d.strengths}
+    return found | {(d.name, s): b.check(d.spoil(b, s)) for d in doses for s in d.strengths}
 
 
-def dose_lines(found: Outcomes) -> list[str]:
+def dose_lines(doses: Sequence[Dose], found: Outcomes) -> list[str]:
     """The faults as a Markdown table: the own measure at each strength, bold where it fails, and what else fails."""
     good = found["nothing", 0.0]
     out = [
         "| fault | its measure | good face | strength: value (**fails**) | related, from | unrelated, from |",
         "|---|---|---|---|---|---|",
     ]
-    for dose in DOSES:
+    for dose in doses:
         values = []
         for strength in dose.strengths:
             own = found[dose.name, strength].get(dose.its)
@@ -53,20 +53,20 @@ def _others(dose: Dose, found: Outcomes) -> dict[str, float]:
     return first
 
 
-def summary(found: Outcomes) -> str:
+def summary(doses: Sequence[Dose], found: Outcomes) -> str:
     """How many faults are caught, from which strength, and what fails for another's fault."""
 
     def caught(dose: Dose, strength: float) -> bool:
         own = found[dose.name, strength].get(dose.its)
         return own is not None and own.failed
 
-    at_all = [d for d in DOSES if any(caught(d, s) for s in d.strengths)]
-    missed = [d.name for d in DOSES if d not in at_all]
-    firm = [d for d in DOSES if len(d.strengths) == 1 or caught(d, d.strengths[-2])]
-    strangers = [d.name for d in DOSES if set(_others(d, found)) - set(d.kin)]
+    at_all = [d for d in doses if any(caught(d, s) for s in d.strengths)]
+    missed = [d.name for d in doses if d not in at_all]
+    firm = [d for d in doses if len(d.strengths) == 1 or caught(d, d.strengths[-2])]
+    strangers = [d.name for d in doses if set(_others(d, found)) - set(d.kin)]
     bad = ", ".join(code for code, v in found["nothing", 0.0].items() if v.failed) or "none"
     return (
-        f"Measures that the good clone fails: {bad}. Of {len(DOSES)} faults, {len(at_all)} are seen by their "
+        f"Measures that the good clone fails: {bad}. Of {len(doses)} faults, {len(at_all)} are seen by their "
         f"measure at the grossest strength or before, {len(firm)} at the second grossest. "
         f"Not seen: {'; '.join(missed) or 'none'}. "
         f"An unrelated measure fails for: {'; '.join(strangers) or 'none'}."

@@ -1,18 +1,20 @@
 """Which measure of ``fba check`` sees which fault: a good face spoilt in known ways, one fault at a time.
 
-    python -m benchmarks.measures [--held-out] [--write]
+    python -m benchmarks.measures [--held-out] [--second] [--makehuman FOLDER] [--write]
 
 The shipped source is cloned onto the smallest shipped head, and each spoilt copy is checked beside the good one. A
 fault must fail its own measure, may fail those that by definition see the same, and must fail no other. --held-out
-checks the faults of `benchmarks.held_out_faults` instead. --write puts the tables into docs/checking.md.
+checks the faults of `benchmarks.held_out_faults` instead, --second those of `benchmarks.second_held_out`, whose head is
+built from a MakeHuman folder. --write puts the tables into docs/checking.md.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,7 +36,11 @@ from studio.judging import Measured, measure, verdicts
 from studio.measures import MEASURES
 from studio.verdicts import Verdict
 
+if TYPE_CHECKING:
+    from benchmarks.doses import Dose
+
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "checking.md"
+MAKEHUMAN = Path(__file__).resolve().parents[2] / "shared" / "faces" / "makehuman"
 HEAD = "faces/tri_head.obj"
 FAPS = (3, 6, 7, 12, 19, 20, 31)
 """Enough to open the mouth, stretch and lift its corners, blink and raise a brow."""
@@ -290,8 +296,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true")
     parser.add_argument("--held-out", action="store_true")
+    parser.add_argument("--second", action="store_true")
+    parser.add_argument("--makehuman", type=Path, default=MAKEHUMAN)
     options = parser.parse_args()
-    tables = _held_out() if options.held_out else _known()
+    tables = _held_out() if options.held_out else _second(options.makehuman) if options.second else _known()
     if options.write:
         put_tables(DOCS, {name: "\n".join(rows) + "\n" for name, rows in tables.items()})
 
@@ -305,13 +313,24 @@ def _known() -> dict[str, list[str]]:
 
 
 def _held_out() -> dict[str, list[str]]:
-    from benchmarks.held_out_faults import held_out_bench
+    from benchmarks.held_out_faults import DOSES, held_out_bench
+
+    return {"held-out": _dosed(held_out_bench(), DOSES)}
+
+
+def _second(makehuman: Path) -> dict[str, list[str]]:
+    from benchmarks.second_held_out import DOSES, second_bench
+
+    return {"second held-out": _dosed(second_bench(makehuman), DOSES)}
+
+
+def _dosed(b: Bench, doses: Sequence[Dose]) -> list[str]:
     from benchmarks.held_out_table import dose_lines, outcomes, summary
 
-    found = outcomes(held_out_bench())
-    table = [*dose_lines(found), "", summary(found)]
+    found = outcomes(b, doses)
+    table = [*dose_lines(doses, found), "", summary(doses, found)]
     print(*table, sep="\n")
-    return {"held-out": table}
+    return table
 
 
 if __name__ == "__main__":
