@@ -108,13 +108,14 @@ def part_moved(b: Bench, fap_id: int, role: Role, way: tuple[float, float, float
 
 def leaking(b: Bench, fap_id: int, other: int, share: float) -> AnimatableFace:
     """A FAP that also does a share of another FAP's motion."""
-    theirs = {m.value: m for m in face_motions(b.face) if m.fap_id == other}
+    theirs = [m for m in face_motions(b.face) if m.fap_id == other]
     names, es0 = b.skin.surface.shapes, b.face.fapu.es0
     still = {n: np.zeros_like(b.face.scene.world_vertices(n)) for n in names}
 
     def leaked(d: Floats, m: FaceMotion) -> Floats:
-        same = {**still, **theirs[m.value].offsets}
-        added: Floats = d + share * np.concatenate([same[n] for n in names]) / es0
+        near = min(theirs, key=lambda t: (t.value * m.value < 0, abs(t.value - m.value)))
+        same = {**still, **near.offsets}
+        added: Floats = d + share * m.value / near.value * np.concatenate([same[n] for n in names]) / es0
         return added
 
     return spoilt(b, fap_id, leaked)
