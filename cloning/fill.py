@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from cloning.factors import factored
 from fba.arrays import Bools, Floats, Ints
 
 
@@ -25,7 +26,6 @@ class HarmonicFill:
         unknown : (n,) bool.
         """
         from scipy.sparse import coo_array, diags_array
-        from scipy.sparse.linalg import splu
 
         n = len(vertices)
         length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
@@ -43,10 +43,7 @@ class HarmonicFill:
         if len(self.rows):
             inner = full[self.rows][:, self.rows]
             total = np.asarray(full[self.rows].sum(axis=1)).ravel()
-            system = (diags_array(total) - inner).tocsc()
-            self._solve = splu(
-                system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-            )
+            self._solve = factored(diags_array(total) - inner)
 
     def apply(self, values: Floats) -> None:
         """Overwrite the unknown rows of (n, m) values in place."""

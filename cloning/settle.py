@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from cloning.factors import factored
 from cloning.locate import Places
 from cloning.surface import Surface
 from fba.arrays import Floats, Ints
@@ -58,12 +59,10 @@ def settle(
 def _smoothed(way: Floats, good: Any, stiffness: Any, fixed: Any, length: float) -> Floats:
     """Minimise good * |x - way|^2 + length^2 |grad x|^2 + GIVEN |x at the feature points|^2."""
     from scipy.sparse import diags_array
-    from scipy.sparse.linalg import splu
 
     weight = np.where(good, 1.0, 1e-3)
     held = GIVEN * (fixed.T @ fixed)
-    system = (diags_array(weight) + length**2 * stiffness + held).tocsc()
-    solver = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    solver = factored(diags_array(weight) + length**2 * stiffness + held)
     right = np.where(good, 1.0, 0.0)[:, None] * way
     solved: Floats = solver.solve(np.asfortranarray(right))
     return solved

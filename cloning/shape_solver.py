@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from cloning.factors import factored
 from fba.arrays import Floats, Ints
 
 COLUMNS = 16
@@ -107,18 +108,12 @@ def shape_transfer(
     row_weight : how much each of them counts.
     """
     from scipy.sparse import csr_array, diags_array
-    from scipy.sparse.linalg import splu
 
     rows = csr_array((0, weld.shape[0])) if rows is None else rows
     holding = (weld.T @ diags_array(stiff * held)).tocsr()
     pulling = (weld.T @ rows.T * (stiff * row_weight)).tocsr()
     return ShapeTransfer(
-        splu(
-            (normal + holding @ weld + pulling @ rows @ weld).tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        ),
+        factored(normal + holding @ weld + pulling @ rows @ weld),
         weld,
         linear.tocsr(),
         turning.tocsr(),
