@@ -16,7 +16,7 @@ from benchmarks.image_errors import errors, face_region
 from cloning.image import METHODS, Analogy, Picture, Places
 from cloning.image.color import UInt8, luminance
 from cloning.image.points import RIGID, fit_similarity_2d, to_array
-from cloning.image.warp import Sampler
+from cloning.image.sampler import Sampler
 from studio.photos import known_points, read_photo, with_points
 from studio.sheet import Sheet
 

@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
+from cloning.image.align import Similarity2D
 from cloning.image.color import Planes, UInt8, is_grey, luminance, relit, to_rgb, to_yuv
 from cloning.image.eri import ratio_image
-from cloning.image.grid import differences, motion_rows, tent_equations, tents, wanted_differences
 from cloning.image.mask import (
     bounds,
     contour,
@@ -33,9 +33,10 @@ from cloning.image.points import (
     to_array,
     turned,
 )
-from cloning.image.solve import PixelSystem
+from cloning.image.sampler import Sampler, part_around
 from cloning.image.texture import without_foreign_texture
-from cloning.image.warp import Sampler, WarpMesh, label_pixels, mapped, part_around, ring_around, triangulate
+from cloning.image.transfer import TentTransfer
+from cloning.image.warp import WarpMesh, covered, label_pixels, mapped, ring_around, triangulate
 from fba.arrays import Bools, Floats, Ints
 
 Method = Literal["vtc", "eri"]
@@ -95,10 +96,13 @@ class _Warp:
     """Everything geometric about one expression, on the pixels of the box.
 
     `mask` says how much a pixel follows the source, `skin` is 0 within the eyes, which keep the target's look, `face`
-    how much the warped face covers the target's picture.
+    how much the warped face covers the target's picture. `expression` are the mesh's corners in the source's picture,
+    of which `shrink` pixels become one.
     """
 
     mesh: WarpMesh
+    expression: Floats
+    shrink: float
     moved: Places
     labels: Ints
     mask: Planes
@@ -143,14 +147,13 @@ class Analogy:
         self._names = face_points(target.points, source.points, *expressions)
         self._source = {n: source.points[n] for n in self._names}
         self._target = {n: target.points[n] for n in self._names}
-        self._fine_target = refined(self._target)
+        self._fine_source, self._fine_target = refined(self._source), refined(self._target)
         self._picture = target.rgb
         self._yuv = to_yuv(target.rgb).astype(np.float32)
         self._grey = is_grey(target.rgb)
         self._unit = eye_separation(target.points)
-        self._height = np.float32(relief * self._unit / 255.0)
         self._across = source_to_target(self._source, self._target, self._names)
-        self._planes = [Sampler(plane, order) for plane, order in zip(self._yuv, (3, 1, 1), strict=True)]
+        self._sharp, self._colours = Sampler(self._yuv[:1]), Sampler(self._yuv[1:], 1)
         self._neutral = Sampler(luminance(source.rgb), shrink=1.0 / self._across.scale)
         fine = [refined(self._moved(points)) for points in expressions]
         self._box = self._box_of(fine)
@@ -158,7 +161,7 @@ class Analogy:
         self._near = widened(self._domain)
         self._inside = bounds(self._domain)
         self._resting = depth_within(contour(self._target), self._box)
-        self._system: PixelSystem | None = None
+        self._tents = TentTransfer(self._domain[self._inside], relief * self._unit / 255.0)
 
     @property
     def unknowns(self) -> int:
@@ -179,33 +182,47 @@ class Analogy:
         """
         face_points({n: self._target[n] for n in self._names}, expression.points)
         warp = self._warp(expression.points)
-        own = {n: expression.points[n] for n in self._names}
         warped, displaced = self._warped_target(warp)
-        asked = ((warp.mask > 0) | self._near) & (warp.labels >= 0)
-        pair = self._source_pair(warp, asked, own, expression)
-        steps, light = 0, relit(*pair, (warp.mask > 0.5) & (warp.skin > 0.99))
-        if self.method == "eri":
-            warped[0] *= 1.0 + warp.skin * warp.mask * (ratio_image(*pair, self._unit) - 1.0)
-        else:
-            neutral, posed = pair
-            if not self.as_published:
-                inside = self._inside
-                target = np.where(asked[inside], warped[0][inside], np.float32(0.0))
-                posed[inside] = without_foreign_texture(neutral[inside], posed[inside], target, self._unit)
-            change, steps = self._transfer(warped[0], neutral, posed, warp.mask)
-            warped[0] += warp.skin * change
+        asked = (warp.mask > 0) | self._near
+        pair = self._source_pair(warp, asked, expression)
+        light = relit(*pair, (warp.mask > 0.5) & (warp.skin > 0.99))
+        steps = self._relight(warped[0], warp, asked, *pair)
         shown = self.teeth and self._opens(expression.points, warp.moved)
         if shown:
-            displaced |= self._show_mouth(warped, warp, own, expression)
-        rows, columns = self._box
-        warped += (1.0 - warp.face) * (self._yuv[:, rows, columns] - warped)
-        changed = np.zeros(self._picture.shape[:2], bool)
-        changed[rows, columns] = (displaced | (warp.mask > 0)) & (warp.face > 0)
-        rgb, whole = self._picture.copy(), self._yuv[0].copy()
-        rgb[changed] = to_rgb(warped[:, changed[rows, columns]])
-        whole[rows, columns] = warped[0]
+            displaced |= self._show_mouth(warped, warp, expression)
+        rgb, whole, changed = self._pasted(warped, warp.face, displaced | (warp.mask > 0))
         head = turned(self._source, expression.points, self._names)
         return AnalogyResult(rgb, whole, changed, dict(warp.moved), steps, shown, head, light)
+
+    def _relight(self, warped: Planes, warp: _Warp, asked: Bools, neutral: Planes, posed: Planes) -> int:
+        """Give the warped target's luminance the source's change, and tell the steps that took."""
+        if self.method == "eri":
+            warped *= 1.0 + warp.skin * warp.mask * (ratio_image(neutral, posed, self._unit) - 1.0)
+            return 0
+        inside = self._inside
+        target, neutral, posed = warped[inside], neutral[inside], posed[inside]
+        if not self.as_published:
+            seen = np.where(asked[inside] & (warp.labels[inside] >= 0), target, np.float32(0.0))
+            posed = without_foreign_texture(neutral, posed, seen, self._unit)
+        change, steps = self._tents.change(target, neutral, posed, warp.mask[inside])
+        target += warp.skin[inside] * change
+        return steps
+
+    def _pasted(self, warped: Planes, face: Planes, moved: Bools) -> tuple[UInt8, Planes, Bools]:
+        """The picture, its luminance, and where it changed: what moved in the face's region, over the target."""
+        rows, columns = self._box
+        soft = np.flatnonzero((face < 1.0) & moved)
+        still = self._yuv[:, rows, columns].reshape(3, -1).take(soft, axis=1)
+        here = warped.reshape(3, -1)
+        mixed = here.take(soft, axis=1)
+        here[:, soft] = mixed + (1.0 - face.take(soft)) * (still - mixed)
+        inside = moved & (face > 0)
+        changed = np.zeros(self._picture.shape[:2], bool)
+        changed[rows, columns] = inside
+        rgb, whole = self._picture.copy(), self._yuv[0].copy()
+        rgb[changed] = to_rgb(here.take(np.flatnonzero(inside), axis=1))
+        whole[rows, columns] = warped[0]
+        return rgb, whole, changed
 
     def _moved(self, expression: Places) -> dict[str, tuple[float, float]]:
         return moved_points(self._source, expression, self._target, self._names)
@@ -233,78 +250,57 @@ class Analogy:
         labels = label_pixels(mesh, self._box)
         mask = np.where(self._domain & (labels >= 0), face_mask(moved, self._box), np.float32(0.0))
         skin = 1.0 - slit_mask(mesh, labels, moved, EYES)
-        depth = np.maximum(self._resting, depth_within(contour(places), self._box))
-        return _Warp(mesh, moved, labels, mask, skin, region_share(depth, self._unit))
+        face = region_share(np.maximum(self._resting, depth_within(contour(places), self._box)), self._unit)
+        own = {n: expression[n] for n in self._names}
+        across = source_to_target(own, self._target, self._names)
+        corners = _corners(mesh, refined(own), across)
+        return _Warp(mesh, corners, 1.0 / across.scale, moved, labels, mask, skin, face)
 
     def _warped_target(self, warp: _Warp) -> tuple[Planes, Bools]:
         """Planes of the warped target in the box, and which pixels the warp moved."""
-        rows, columns = np.nonzero((warp.labels >= 0) & ((warp.face > 0) | self._near))
+        pixels = covered(warp.labels, (warp.face > 0) | self._near, self._box)
         goals = np.concatenate([to_array(self._fine_target, warp.mesh.names), warp.mesh.ring])
-        places = mapped(warp.mesh.affine(goals), warp.labels, rows, columns, self._box)
-        here = np.stack([columns + self._box[1].start, rows + self._box[0].start])
-        off = np.abs(places - here).max(axis=0) > 1e-6
-        rows, columns, places = rows[off], columns[off], places[:, off]
+        places = mapped(warp.mesh.affine(goals), pixels)
+        off = (np.abs(places[0] - pixels.x) > 1e-6) | (np.abs(places[1] - pixels.y) > 1e-6)
+        rows, columns, places = pixels.rows[off], pixels.columns[off], places[:, off]
         planes = self._yuv[:, self._box[0], self._box[1]].copy()
-        for plane, sampler in zip(planes, self._planes, strict=True):
-            plane[rows, columns] = sampler.at(places)
+        planes[:1, rows, columns] = self._sharp.at(places)
+        planes[1:, rows, columns] = self._colours.at(places)
         displaced = np.zeros(warp.labels.shape, bool)
         displaced[rows, columns] = True
         return planes, displaced
 
-    def _source_pair(self, warp: _Warp, asked: Bools, own: Places, expression: Picture) -> tuple[Planes, Planes]:
+    def _source_pair(self, warp: _Warp, asked: Bools, expression: Picture) -> tuple[Planes, Planes]:
         """Luminance of the source's two pictures at the pixels of the warped target; zero where nothing is asked."""
-        rows, columns = np.nonzero(asked)
+        pixels = covered(warp.labels, asked, self._box)
         pair = np.zeros((2, *warp.labels.shape), np.float32)
-        still, moved = (
-            mapped(warp.mesh.affine(self._places(warp, points)), warp.labels, rows, columns, self._box)
-            for points in (self._source, own)
-        )
-        pair[0, rows, columns] = self._neutral.at(still)
-        shrink = 1.0 / self._expression_scale(own)
-        rgb, moved = part_around(expression.rgb, moved, shrink)
-        pair[1, rows, columns] = Sampler(luminance(rgb), shrink=shrink).at(moved)
+        still = _corners(warp.mesh, self._fine_source, self._across)
+        pair[0, pixels.rows, pixels.columns] = self._neutral.at(mapped(warp.mesh.affine(still), pixels))
+        rgb, moved = part_around(expression.rgb, mapped(warp.mesh.affine(warp.expression), pixels), warp.shrink)
+        pair[1, pixels.rows, pixels.columns] = Sampler(luminance(rgb), shrink=warp.shrink).at(moved)
         return pair[0], pair[1]
-
-    def _expression_scale(self, own: Places) -> float:
-        return source_to_target(own, self._target, self._names).scale
-
-    def _places(self, warp: _Warp, points: Places) -> Floats:
-        """The mesh's corners in a picture of the source; the ring is carried over by the alignment."""
-        back = source_to_target(points, self._target, self._names).inverse()
-        return np.concatenate([to_array(refined(points), warp.mesh.names), back.apply(warp.mesh.ring)])
-
-    def _transfer(self, warped: Planes, neutral: Planes, expression: Planes, mask: Planes) -> tuple[Planes, int]:
-        """The change of luminance by which the target's tents follow the source's."""
-        inside = self._inside
-        warped, neutral, expression = (self._height * plane[inside] for plane in (warped, neutral, expression))
-        share = mask[inside][1:-1, 1:-1]
-        target = tents(warped)
-        motion = share * motion_rows(tents(neutral), tents(expression))
-        motion[2] += 1.0 - share
-        wanted = wanted_differences(target, motion, target.ring + share * differences(expression - neutral))
-        if self._system is None:
-            self._system = PixelSystem(self._domain[inside], tent_equations(target)[0])
-        found, steps = self._system.solve(wanted - target.ring)
-        change = np.zeros(mask.shape, np.float32)
-        change[inside] = found / self._height
-        return change, steps
 
     def _opens(self, expression: Places, moved: Places) -> bool:
         """True where lips part that both neutral faces keep shut."""
         still = max(mouth_opening(self._source), mouth_opening(self._target))
         return still < SHUT and still + PARTED < min(mouth_opening(expression), mouth_opening(moved))
 
-    def _show_mouth(self, warped: Planes, warp: _Warp, own: Places, expression: Picture) -> Bools:
+    def _show_mouth(self, warped: Planes, warp: _Warp, expression: Picture) -> Bools:
         """Put the source's pixels between the lips, and say where."""
         share = slit_mask(warp.mesh, warp.labels, warp.moved, MOUTH) * (warp.labels >= 0)
-        rows, columns = np.nonzero(share)
-        if not len(rows):
-            return share > 0
-        places = mapped(warp.mesh.affine(self._places(warp, own)), warp.labels, rows, columns, self._box)
-        shrink = 1.0 / self._expression_scale(own)
-        share_here = share[rows, columns]
-        rgb, places = part_around(expression.rgb, places, shrink)
-        for k, plane in enumerate(to_yuv(rgb)):
-            inside = np.zeros(len(rows), np.float32) if k and self._grey else Sampler(plane, 1, shrink).at(places)
-            warped[k, rows, columns] += share_here * (inside - warped[k, rows, columns])
-        return share > 0
+        shown = share > 0
+        pixels = covered(warp.labels, shown, self._box)
+        if len(pixels.rows):
+            here = share[pixels.rows, pixels.columns]
+            rgb, places = part_around(expression.rgb, mapped(warp.mesh.affine(warp.expression), pixels), warp.shrink)
+            inside = Sampler(to_yuv(rgb), 1, warp.shrink).at(places)
+            if self._grey:
+                inside[1:] = 0.0
+            outside = warped[:, pixels.rows, pixels.columns]
+            warped[:, pixels.rows, pixels.columns] = outside + here * (inside - outside)
+        return shown
+
+
+def _corners(mesh: WarpMesh, fine: Places, across: Similarity2D) -> Floats:
+    """The mesh's corners in a picture of the source; the ring is carried over by the alignment to the target."""
+    return np.concatenate([to_array(fine, mesh.names), across.inverse().apply(mesh.ring)])

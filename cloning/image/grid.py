@@ -9,11 +9,16 @@ row of w^T (w w^T)^-1, and two equations for five pixels remain.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cloning.image.color import Planes
+
+Indices = NDArray[np.integer[Any]]
 
 SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))
 """Steps (rows, columns) to the ring's pixels."""
@@ -21,59 +26,73 @@ SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 @dataclass(frozen=True, eq=False)
 class Tents:
-    """The tents of the inner pixels of a plane (h, w), as planes (h - 2, w - 2).
+    """The tents of any number of pixels, arrays of whose shape are written as ....
 
     Attributes
     ----------
     ring : (4, ...) luminance differences to the neighbours, in the order of `SIDES`.
-    normal : (3, ...) unit normals.
+    normal : x, y, z of the unit normals.
     length : length of the tips.
-    inverse : (6, ...) of w w^T: xx, yy, zz, xy, xz, yz.
+    inverse : of w w^T: xx, yy, zz, xy, xz, yz.
     """
 
     ring: Planes
-    normal: Planes
+    normal: tuple[Planes, Planes, Planes]
     length: Planes
-    inverse: Planes
+    inverse: tuple[Planes, ...]
 
-    def solve(self, x: Planes | float, y: Planes | float, z: Planes | float) -> Planes:
-        """(3, ...) (w w^T)^-1 times a vector."""
+    def solve(self, x: Planes, y: Planes, z: Planes) -> tuple[Planes, Planes, Planes]:
+        """(w w^T)^-1 times a vector."""
         xx, yy, zz, xy, xz, yz = self.inverse
-        return np.stack([xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z])
+        return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
 
 
-def differences(plane: Planes) -> Planes:
-    """(4, h - 2, w - 2) differences from each inner pixel to its neighbours, in the order of `SIDES`."""
-    middle = plane[1:-1, 1:-1]
-    h, w = plane.shape
-    return np.stack([plane[1 + r : h - 1 + r, 1 + c : w - 1 + c] - middle for r, c in SIDES])
+def differences(plane: Planes, at: Indices) -> Planes:
+    """(4, ...) differences from inner pixels of a plane to their neighbours, in the order of `SIDES`.
+
+    Parameters
+    ----------
+    plane : (h, w).
+    at : (...) places of the pixels in the plane, counted row by row.
+    """
+    flat, wide = plane.ravel(), plane.shape[1]
+    above = at - wide
+    middle = flat[wide:].take(above)
+    out = np.empty((len(SIDES), *at.shape), plane.dtype)
+    for found, (down, across) in zip(out, SIDES, strict=True):
+        np.subtract(flat[(1 + down) * wide + across :].take(above), middle, out=found)
+    return out
 
 
-def tents(plane: Planes) -> Tents:
-    """Build the tents of a height field (h, w), heights in pixels; 4-byte floats are enough and twice as fast."""
-    ring = differences(plane)
+def tents(ring: Planes) -> Tents:
+    """Build tents from the differences (4, ...) in their rings; 4-byte floats are enough and twice as fast."""
     right, left, down, up = ring
-    nx, ny = (left - right) / 2.0, (up - down) / 2.0
+    x, y = right - left, down - up
+    nx, ny = -0.5 * x, -0.5 * y
     nz = 1.0 / np.sqrt(1.0 + nx * nx + ny * ny)
-    nx, ny = nx * nz, ny * nz
-    length = np.sqrt(1.0 + ring * ring).mean(axis=0)
+    nx *= nz
+    ny *= nz
+    squared = ring * ring
+    length = 0.25 * np.sqrt(1.0 + squared).sum(axis=0)
     tip = length * length
-    xx, yy = 2.0 + tip * nx * nx, 2.0 + tip * ny * ny
-    zz = np.einsum("kij,kij->ij", ring, ring) + tip * nz * nz
-    xy, xz, yz = tip * nx * ny, right - left + tip * nx * nz, down - up + tip * ny * nz
-    minors = np.stack([
+    tx, ty, tz = tip * nx, tip * ny, tip * nz
+    xx, yy, zz = 2.0 + tx * nx, 2.0 + ty * ny, squared.sum(axis=0) + tz * nz
+    xy, xz, yz = tx * ny, x + tx * nz, y + ty * nz
+    minors = (
         yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy,
         xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz,
-    ])  # fmt: skip
-    minors /= xx * minors[0] + xy * minors[3] + xz * minors[4]
-    return Tents(ring, np.stack([nx, ny, nz]), length, minors)
+    )  # fmt: skip
+    scale = 1.0 / (xx * minors[0] + xy * minors[3] + xz * minors[4])
+    for minor in minors:
+        minor *= scale
+    return Tents(ring, (nx, ny, nz), length, minors)
 
 
-def motion_rows(neutral: Tents, expression: Tents) -> Planes:
-    """(3, ...) the luminance row of each source transform Q = w' w^T (w w^T)^-1."""
+def motion_rows(neutral: Tents, expression: Tents) -> tuple[Planes, Planes, Planes]:
+    """The luminance row of each source transform Q = w' w^T (w w^T)^-1."""
     tip = expression.length * expression.normal[2] * neutral.length
     right, left, down, up = expression.ring
-    height = np.einsum("kij,kij->ij", expression.ring, neutral.ring)
+    height = (expression.ring * neutral.ring).sum(axis=0)
     nx, ny, nz = neutral.normal
     return neutral.solve(right - left + tip * nx, down - up + tip * ny, height + tip * nz)
 
@@ -86,32 +105,42 @@ def tent_equations(target: Tents) -> tuple[Planes, Planes]:
     (2, 4, ...) coefficients of the luminance differences in the ring, and (2, 3, ...) those of the row of the source's
     transform to which their sums must be equal.
     """
-    p = target.solve(*target.normal)
-    p /= np.sqrt(np.einsum("kij,kij->ij", p, p))
-    flat = np.hypot(p[0], p[2])
-    axes = np.zeros((2, *p.shape), p.dtype)
-    axes[0, 0], axes[0, 2] = p[2] / flat, -p[0] / flat
-    axes[1, 0], axes[1, 1], axes[1, 2] = p[1] * axes[0, 2], flat, -p[1] * axes[0, 0]
-    rows = np.empty((2, 4, *p.shape[1:]), p.dtype)
+    px, py, pz = target.solve(*target.normal)
+    scale = 1.0 / np.sqrt(px * px + py * py + pz * pz)
+    px, py, pz = px * scale, py * scale, pz * scale
+    flat = np.sqrt(px * px + pz * pz)
+    axes = np.empty((2, 3, *flat.shape), flat.dtype)
+    np.divide(pz, flat, out=axes[0, 0])
+    axes[0, 1] = 0.0
+    np.divide(-px, flat, out=axes[0, 2])
+    axes[1] = py * axes[0, 2], flat, -py * axes[0, 0]
+    rows = np.empty((2, 4, *flat.shape), flat.dtype)
     for row, axis in zip(rows, axes, strict=True):
         x, y, z = target.solve(*axis)
-        for k, along in enumerate((x, -x, y, -y)):
-            row[k] = along + z * target.ring[k]
+        np.multiply(z, target.ring, out=row)
+        row[0] += x
+        row[1] -= x
+        row[2] += y
+        row[3] -= y
     return rows, axes
 
 
-def wanted_differences(target: Tents, motion: Planes, near: Planes) -> Planes:
+def wanted_differences(target: Tents, motion: Sequence[Planes], near: Planes) -> Planes:
     """(4, ...) the differences in each ring that fulfil the tent's two equations, nearest to given ones.
 
     Parameters
     ----------
-    motion : (3, ...) rows of the source's transforms.
+    motion : the three entries of the rows of the source's transforms.
     near : (4, ...) the differences where the equations leave a choice.
     """
     rows, axes = tent_equations(target)
-    left = np.einsum("akij,kij->aij", axes, motion) - np.einsum("akij,kij->aij", rows, near)
-    aa, bb, ab = (np.einsum("kij,kij->ij", rows[i], rows[j]) for i, j in ((0, 0), (1, 1), (0, 1)))
-    det = aa * bb - ab * ab
-    first, second = (bb * left[0] - ab * left[1]) / det, (aa * left[1] - ab * left[0]) / det
-    out: Planes = near + first * rows[0] + second * rows[1]
+    one, other = rows
+    left = [
+        sum(a * m for a, m in zip(axis, motion, strict=True)) - (row * near).sum(axis=0)
+        for axis, row in zip(axes, rows, strict=True)
+    ]
+    aa, bb, ab = (one * one).sum(axis=0), (other * other).sum(axis=0), (one * other).sum(axis=0)
+    scale = 1.0 / (aa * bb - ab * ab)
+    first, second = (bb * left[0] - ab * left[1]) * scale, (aa * left[1] - ab * left[0]) * scale
+    out: Planes = near + first * one + second * other
     return out

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cloning.image.color import Planes
 from cloning.image.grid import SIDES
 from cloning.image.multigrid import Multigrid, factored
+from cloning.image.parts import parts
 from fba.arrays import Bools
 from fba.errors import CloningError
 
@@ -30,6 +32,14 @@ class _Solver(Protocol):
     def solve(self, right: Any) -> Any: ...
 
 
+def around(domain: Bools) -> NDArray[np.intp]:
+    """(n,) places of the pixels whose tents touch a domain (h, w), counted row by row."""
+    touched = domain.copy()
+    for down, across in SIDES:
+        touched |= np.roll(domain, (down, across), (0, 1))
+    return np.flatnonzero(touched)
+
+
 class PixelSystem:
     """Least squares for one unknown a pixel, prepared once for any number of right-hand sides.
 
@@ -39,37 +49,21 @@ class PixelSystem:
     Parameters
     ----------
     domain : (h, w) the unknown pixels; the two outermost rows and columns must be known, as is everything else.
-    coefficients : (2, 4, h - 2, w - 2) of the differences in the rings, two equations for each inner pixel.
+    coefficients : (2, 4, n) of the differences in the rings, two equations for each of the pixels `around` the domain.
     """
 
     def __init__(self, domain: Bools, coefficients: Planes) -> None:
-        from scipy import sparse
-
-        self.domain = domain
-        self.count = int(domain.sum())
-        number = np.full(domain.shape, -1, np.int32)
-        number[domain] = np.arange(self.count, dtype=np.int32)
-        h, w = domain.shape
-        inner, around = number[1:-1, 1:-1], [number[1 + r : h - 1 + r, 1 + c : w - 1 + c] for r, c in SIDES]
-        five = np.stack([inner, *around], axis=-1)
-        self._touched = (five >= 0).any(axis=-1)
-        self._coefficients = coefficients[:, :, self._touched]
-        columns, values = [], []
-        for row in self._coefficients:
-            columns.append(five[self._touched])
-            values.append(np.concatenate([-row.sum(axis=0, keepdims=True), row]).T)
-        self._edges = []
-        for k in (0, 2):
-            pair = five[..., [0, k + 1]]
-            self._edges.append((pair >= 0).any(axis=-1))
-            columns.append(pair[self._edges[-1]])
-            values.append(np.tile([-1.0, 1.0], (len(columns[-1]), 1)) * np.sqrt(EDGE_WEIGHT))
-        known = np.concatenate([(c < 0).ravel() for c in columns])
-        starts = np.concatenate([[0], np.cumsum(np.concatenate([(c >= 0).sum(axis=1) for c in columns]))])
-        index, data = (np.concatenate([part.ravel() for part in parts])[~known] for parts in (columns, values))
-        rows = sparse.csr_array((data.astype(np.float64), index, starts), shape=(len(starts) - 1, self.count))
-        across = rows.T.tocsr()
-        self._across, self._matrix = across.astype(np.float32), (across @ rows).tocsr()
+        self._shape, self._unknown = domain.shape, np.flatnonzero(domain)
+        self.count, at = len(self._unknown), around(domain)
+        self._coefficients = coefficients
+        number = np.full(domain.size, -1, np.int32)
+        number[self._unknown] = np.arange(self.count, dtype=np.int32)
+        steps = [down * domain.shape[1] + across for down, across in SIDES]
+        self._matrix = _normal_matrix(np.stack([number[at + step] for step in (0, *steps)], axis=1), coefficients)
+        tent = np.full(domain.size, -1, np.intp)
+        tent[at] = np.arange(len(at))
+        self._own = tent[self._unknown]
+        self._reaching = [tent[self._unknown - step] for step in steps]
         self.direct = self.count <= DIRECT
         self._near: _Solver = (
             factored(self._matrix.astype(np.float32)) if self.direct else Multigrid(self._matrix, domain)
@@ -80,7 +74,7 @@ class PixelSystem:
 
         Parameters
         ----------
-        wanted : (4, h - 2, w - 2) differences in the ring of each inner pixel.
+        wanted : (4, n) differences in the rings of the pixels `around` the domain.
 
         Returns
         -------
@@ -91,18 +85,51 @@ class PixelSystem:
         CloningError
             If the iteration does not converge.
         """
-        ring = wanted[:, self._touched]
-        parts = [np.einsum("ki,ki->i", row, ring) for row in self._coefficients]
-        edges = zip((0, 2), self._edges, strict=True)
-        bound = [np.sqrt(EDGE_WEIGHT) * wanted[k][kept] for k, kept in edges]
-        right = self._across @ np.concatenate([*parts, *bound]).astype(np.float32)
+        right = self._right(wanted.astype(np.float32, copy=False))
         if self.direct:
             found, steps = self._near.solve(right), 0
         else:
             found, steps = _iterate(self._matrix, right.astype(np.float64), self._near)
-        out = np.zeros(self.domain.shape, np.float32)
-        out[self.domain] = found
+        out = np.zeros(self._shape, np.float32)
+        out.ravel()[self._unknown] = found
         return out, steps
+
+    def _right(self, wanted: Planes) -> Planes:
+        """(count,) the transposed rows times what they shall be: what every difference pulls at its two pixels."""
+        pull = np.empty_like(wanted)
+        for part in parts(wanted.shape[1]):
+            here, asked = pull[:, part], wanted[:, part]
+            here[:] = 0.0
+            for row in self._coefficients[:, :, part]:
+                here += row * (row * asked).sum(axis=0)
+            here[::2] += np.float32(EDGE_WEIGHT) * asked[::2]
+        right: Planes = -pull.sum(axis=0).take(self._own)
+        for side, tent in zip(pull, self._reaching, strict=True):
+            right += side.take(tent)
+        return right
+
+
+def _normal_matrix(five: NDArray[np.int32], coefficients: Planes) -> Any:
+    """The matrix of the least squares.
+
+    Parameters
+    ----------
+    five : (n, 5) numbers of the unknowns of each tent: its pixel and the ring; -1 where known.
+    """
+    from scipy import sparse
+
+    columns, values = [], []
+    for row in coefficients:
+        columns.append(five)
+        values.append(np.concatenate([-row.sum(axis=0, keepdims=True), row]).T)
+    for k in (1, 3):
+        columns.append(five[:, [0, k]])
+        values.append(np.tile([-1.0, 1.0], (len(five), 1)) * np.sqrt(EDGE_WEIGHT))
+    known = np.concatenate([(c < 0).ravel() for c in columns])
+    starts = np.concatenate([[0], np.cumsum(np.concatenate([(c >= 0).sum(axis=1) for c in columns]))])
+    index, data = (np.concatenate([a.ravel() for a in arrays])[~known] for arrays in (columns, values))
+    rows = sparse.csr_array((data.astype(np.float64), index, starts), shape=(len(starts) - 1, int(five.max()) + 1))
+    return (rows.T.tocsr() @ rows).tocsr()
 
 
 def _iterate(matrix: Any, right: Planes, near: _Solver) -> tuple[Planes, int]:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cloning.image.color import Planes, UInt8
+from cloning.image.parts import parts
 from cloning.image.points import EYES, MOUTH, Places, eye_separation, rim_names, to_array
-from fba.arrays import Floats, Ints
+from fba.arrays import Bools, Floats, Ints
 
 Indices = NDArray[np.integer[Any]]
 
@@ -22,9 +22,6 @@ RING_POINTS = 24
 APART = 0.03
 """Rims of lips and lids are held so far apart, in eye separations, while the triangles are chosen: shut lips would
 otherwise be tied to each other by chance."""
-
-BORDER = 12.0
-"""Pixels; what lies farther away changes a cubic spline by less than a millionth."""
 
 EDGE = 1e-9
 """Pixels; a pixel this near to a triangle's edge belongs to it."""
@@ -102,9 +99,10 @@ def label_pixels(mesh: WarpMesh, box: tuple[slice, slice]) -> Ints:
     rows, columns = box
     labels = np.full((rows.stop - rows.start, columns.stop - columns.start), -1, np.int32)
     triangles, lines, starts, counts = _spans(mesh.places[mesh.triangles] - [columns.start, rows.start], labels.shape)
-    number = np.repeat(np.arange(len(counts)), counts)
-    along = np.arange(len(number)) - np.repeat(np.cumsum(counts) - counts, counts)
-    labels.ravel()[(lines * labels.shape[1] + starts)[number] + along] = triangles[number]
+    before = np.cumsum(counts) - counts
+    at = np.repeat(lines * labels.shape[1] + starts - before, counts)
+    at += np.arange(len(at))
+    labels.ravel()[at] = np.repeat(triangles.astype(np.int32), counts)
     return labels
 
 
@@ -132,56 +130,39 @@ def _spans(corners: Floats, shape: tuple[int, ...]) -> tuple[Indices, Indices, I
     return triangles[kept], lines[kept], starts[kept], counts[kept]
 
 
-def mapped(affine: Floats, labels: Ints, rows: Indices, columns: Indices, box: tuple[slice, slice]) -> Floats:
-    """(2, p) places (x, y) in another picture for pixels of a box, all of them in some triangle."""
-    label = labels[rows, columns]
-    x, y = (columns + box[1].start).astype(np.float64), (rows + box[0].start).astype(np.float64)
-    out = np.empty((2, len(label)))
-    for goal, (by_x, by_y, shift) in zip(out, np.ascontiguousarray(np.moveaxis(affine, 0, -1)), strict=True):
-        np.multiply(by_x[label], x, out=goal)
-        goal += by_y[label] * y
-        goal += shift[label]
-    return out
+@dataclass(frozen=True, eq=False)
+class Covered:
+    """Pixels of a box that lie in some triangle.
 
-
-def part_around(rgb: UInt8, places: Floats, shrink: float) -> tuple[UInt8, Floats]:
-    """The part of a picture that is read at (2, p) places, and the places in it."""
-    margin = BORDER + 2.0 * max(shrink, 1.0)
-    low = np.clip(places.min(axis=1) - margin, 0, [rgb.shape[1] - 1, rgb.shape[0] - 1]).astype(int)
-    high = np.maximum(np.ceil(places.max(axis=1) + margin).astype(int), low) + 1
-    return rgb[low[1] : high[1], low[0] : high[0]], places - low[:, None]
-
-
-class Sampler:
-    """A plane of a picture that can be read between its pixels.
-
-    Parameters
+    Attributes
     ----------
-    plane : (h, w).
-    order : 3 = cubic spline, 1 = linear.
-    shrink : how many of its pixels will become one; more than 1 blurs it first, so that it does not alias.
+    rows, columns : (p,) in the box.
+    label : (p,) the triangle of each.
+    x, y : (p,) in the picture.
     """
 
-    def __init__(self, plane: Planes, order: int = 3, shrink: float = 1.0) -> None:
-        from scipy import ndimage
+    rows: Indices
+    columns: Indices
+    label: Indices
+    x: Floats
+    y: Floats
 
-        plane = np.asarray(plane, np.float32)
-        if shrink > 1.0:
-            plane = ndimage.gaussian_filter(plane, 0.5 * np.sqrt(shrink**2 - 1.0), mode="nearest")
-        self._order = order
-        self._plane = plane
-        if order > 1:
-            self._plane = np.empty_like(plane)
-            filters: Any = ndimage
-            filters.spline_filter(plane, order, output=self._plane, mode="nearest")
 
-    def at(self, places: Floats) -> Planes:
-        """Values at (2, p) places (x, y); beyond the border its value counts."""
-        from scipy import ndimage
+def covered(labels: Ints, where: Bools, box: tuple[slice, slice]) -> Covered:
+    """Those of some pixels of a box that lie in a triangle, row by row."""
+    rows, columns = np.nonzero(where & (labels >= 0))
+    x, y = (columns + box[1].start).astype(np.float64), (rows + box[0].start).astype(np.float64)
+    return Covered(rows, columns, labels[rows, columns].astype(np.intp), x, y)
 
-        filters: Any = ndimage
-        found = np.empty(places.shape[1], np.float32)
-        filters.map_coordinates(
-            self._plane, places[::-1], output=found, order=self._order, mode="nearest", prefilter=False
-        )
-        return found
+
+def mapped(affine: Floats, pixels: Covered) -> Floats:
+    """(2, p) places (x, y) of pixels in another picture."""
+    out = np.empty((2, len(pixels.label)))
+    by_x, by_y, shift = np.ascontiguousarray(np.moveaxis(affine, 0, -1)).swapaxes(0, 1)
+    for part in parts(len(pixels.label)):
+        label, x, y = pixels.label[part], pixels.x[part], pixels.y[part]
+        for k, goal in enumerate(out[:, part]):
+            np.multiply(by_x[k].take(label), x, out=goal)
+            goal += by_y[k].take(label) * y
+            goal += shift[k].take(label)
+    return out

@@ -13,7 +13,8 @@ from cloning.image.color import RGB_FROM_YUV, YUV_FROM_RGB, is_grey, to_rgb, to_
 from cloning.image.eri import correlation, ratio_image
 from cloning.image.mask import BORDER, REACH, contour, depth_within, face_mask, mouth_opening, region_share
 from cloning.image.points import REQUIRED, face_points, moved_points, refined, to_array, turned
-from cloning.image.warp import Sampler, label_pixels, mapped, ring_around, triangulate
+from cloning.image.sampler import Sampler
+from cloning.image.warp import covered, label_pixels, mapped, ring_around, triangulate
 from cloning.interpolate import TriangleMesh2D
 from fba.errors import LandmarkError
 
@@ -78,12 +79,12 @@ def test_labels_are_those_of_exact_location() -> None:
     moved = refined(points({"2.3": (0.0, 0.2), "8.2": (0.0, 0.2), "2.1": (0.0, 0.15)}))
     mesh = triangulate(moved, refined(points()), SIZE)
     labels = label_pixels(mesh, WHOLE)
-    rows, columns = np.nonzero(labels >= 0)
-    at = np.stack([columns, rows], axis=1).astype(float)
+    pixels = covered(labels, np.ones(labels.shape, bool), WHOLE)
+    at = np.stack([pixels.x, pixels.y], axis=1)
     exact = TriangleMesh2D(mesh.places, mesh.triangles).locate(at)
     assert exact.inside.all()
     goals = np.concatenate([to_array(refined(points()), mesh.names), mesh.ring])
-    places = mapped(mesh.affine(goals), labels, rows, columns, WHOLE)
+    places = mapped(mesh.affine(goals), pixels)
     wanted = np.einsum("nk,nkd->dn", exact.weights, goals[mesh.triangles[exact.triangles]])
     agreed = np.abs(places - wanted).max(axis=0) < 1e-6
     # Only where triangles of the lips overlap may another one win.
@@ -137,6 +138,18 @@ def test_a_shrunk_picture_does_not_alias() -> None:
     middle = np.array([[10.0, 10.5, 11.0], [20.0, 20.0, 20.0]])
     assert np.ptp(Sampler(stripes).at(middle)) > 150.0
     assert Sampler(stripes, shrink=6.0).at(middle) == pytest.approx(100.0, abs=1.0)
+
+
+@pytest.mark.parametrize("order", [1, 3])
+def test_pictures_are_read_as_scipy_reads_them(order: int) -> None:
+    """Within, on whole pixels, on the last row and column, and beyond the border."""
+    rng = np.random.default_rng(11)
+    plane = (255.0 * rng.random((2, 40, 31))).astype(np.float32)
+    places = np.concatenate([rng.uniform(-6.0, 46.0, (2, 20000)), rng.integers(-2, 42, (2, 200))], axis=1)
+    for found, one in zip(Sampler(plane, order).at(places), plane, strict=True):
+        ready = ndimage.spline_filter(one, order, mode="nearest") if order > 1 else one
+        wanted = ndimage.map_coordinates(ready, places[::-1], order=order, mode="nearest", prefilter=False)
+        assert found == pytest.approx(wanted, abs=2e-4)
 
 
 def test_ratio_images() -> None:
