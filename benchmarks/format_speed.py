@@ -1,22 +1,30 @@
-"""How long every format takes to read and write: ``python -m benchmarks.format_speed``.
+"""How long every format takes to read and write: ``python -m benchmarks.format_speed [--json]``.
 
 A grid of 100,000 vertices with uv goes through every mesh format; the shipped source with all its tables through
 every format that carries tables. Seconds are of the processor. PyVRML97, where it is installed, reads the same VRML
-file in the same run.
+file in the same run. --json prints the numbers as one line of JSON.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fba import FaceScene, PolyMesh, Shape
 from formats import formats, read, read_face, write
+
+Rows = dict[str, dict[str, float]]
+"""Extension -> seconds to write and to read, and MB; "PyVRML97": seconds to parse."""
+
+ALIASES = (".vrml", ".wrz", ".x3dz", ".xmt", ".xmt.gz", ".usd")
+"""Other names of what is measured already."""
 
 
 def grid(side: int) -> FaceScene:
@@ -40,47 +48,58 @@ def best(work: Callable[[], object], rounds: int) -> float:
     return min(times)
 
 
-def row(name: str, write_it: Callable[[], object], read_it: Callable[[], object], path: Path, rounds: int) -> float:
-    """Measure and print one line; return the reading time."""
-    writing = best(write_it, rounds)
-    reading = best(read_it, rounds)
-    print(f"{name:<12}{writing:>9.2f} s{reading:>9.2f} s{path.stat().st_size / 1e6:>9.1f} MB")
-    return reading
-
-
 def main() -> None:
     """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3)
-    rounds = parser.parse_args().rounds
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    found = measured(options.rounds)
+    if options.json:
+        print(json.dumps(found))
+        return
+    for title, rows in found.items():
+        print(f"\n{title}\n{'':<12}{'write':>11}{'read':>11}{'size':>12}")
+        for name, row in rows.items():
+            writing = f"{row['write']:>9.2f} s" if "write" in row else " " * 11
+            size = f"{row['MB']:>9.1f} MB" if "MB" in row else ""
+            print(f"{name:<12}{writing}{row['read']:>9.2f} s{size}")
+
+
+def measured(rounds: int) -> dict[str, Rows]:
+    """Both tables, by what is written."""
     source = read_face("default")
+    tables = f"shipped source, {source.scene.vertex_count:,} vertices, {len(source.tables)} tables"
+    return {"grid, 100,489 vertices": table(grid(317), False, rounds), tables: table(source, True, rounds)}
+
+
+def table(face: Any, only_tables: bool, rounds: int) -> Rows:
+    """Every format that holds a face of this kind, there and back."""
+    rows: Rows = {}
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for title, face, only_tables in (
-            ("plain mesh, 100,489 vertices", grid(317), False),
-            (f"shipped source, {source.scene.vertex_count} vertices, {len(source.tables)} tables", source, True),
-        ):
-            print(f"\n{title}\n{'':<12}{'write':>11}{'read':>11}{'size':>12}")
-            for entry in formats():
-                if not (entry.reads and entry.writes) or (only_tables and not entry.carries_tables):
-                    continue
-                for extension in entry.extensions:
-                    path = folder / f"face{extension}"
-                    seconds = row(extension, lambda p=path, f=face: write(f, p), lambda p=path: read(p), path, rounds)
-                    if extension == ".wrl" and not only_tables:
-                        compare_with_pyvrml(path, seconds)
+        for entry in formats():
+            if not (entry.reads and entry.writes) or (only_tables and not entry.carries_tables):
+                continue
+            for extension in (e for e in entry.extensions if e not in ALIASES):
+                path = Path(name) / extension[1:] / f"face{extension}"
+                path.parent.mkdir()
+                writing = best(lambda p=path: write(face, p), rounds)  # type: ignore[misc]
+                reading = best(lambda p=path: read(p), rounds)  # type: ignore[misc]
+                size = sum(file.stat().st_size for file in path.parent.iterdir()) / 1e6
+                rows[extension] = {"write": writing, "read": reading, "MB": size}
+                if extension == ".wrl" and not only_tables:
+                    rows.update(by_pyvrml(path))
+    return rows
 
 
-def compare_with_pyvrml(path: Path, seconds: float) -> None:
-    """Read the same file with PyVRML97."""
+def by_pyvrml(path: Path) -> Rows:
+    """The same file parsed by PyVRML97, where it is installed."""
     try:
         from vrml.vrml97.parser import buildParser
     except ImportError:
-        print("  (PyVRML97 is not installed)")
-        return
+        return {}
     text = path.read_text()
-    other = best(lambda: buildParser().parse(text), 1)
-    print(f"  PyVRML97 parses the same file in {other:.2f} s: {other / seconds:.0f} times as long")
+    return {"PyVRML97": {"read": best(lambda: buildParser().parse(text), 1)}}
 
 
 if __name__ == "__main__":

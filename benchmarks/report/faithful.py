@@ -11,6 +11,7 @@ import json
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from benchmarks.report.heads import source
 from benchmarks.vtc import by_solvers, skin_motions
 from cloning import clone
 from fat.evaluate import Player
+from fat.face import AnimatableFace
 from formats import read_scene, write
 from samples import sample
 from studio.cli.app import app
@@ -51,18 +53,24 @@ def checked() -> dict[str, float]:
         rest, shapes = face.scene, Player(face).pose({}).world_shapes()
         off = max(float(np.abs(shapes[s.name] - rest.world_vertices(s.name)).max()) for s in rest.shapes)
         found["neutral"] = max(found["neutral"], off)
-        with tempfile.TemporaryDirectory() as name:
-            path = Path(name) / "face.wrl"
-            write(face, path)
-            text = io.StringIO()
-            with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
-                app(["check", str(path), "--source", "default", "--json"])
-        for row in json.loads(text.getvalue())["measures"]:
+        for row in told_by_check(face):
             if row["code"] in CHECKED:
                 key, own = CHECKED[row["code"]], row["source"] or 0.0
                 found[key] = max(found.get(key, 0.0), row["value"])
                 found[f"{key}, source"] = max(found.get(f"{key}, source", 0.0), own)
     return found
+
+
+def told_by_check(face: AnimatableFace) -> list[dict[str, Any]]:
+    """The measures of `fba check` on a written clone of the shipped source."""
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "face.wrl"
+        write(face, path)
+        text = io.StringIO()
+        with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
+            app(["check", str(path), "--source", "default", "--json"])
+    rows: list[dict[str, Any]] = json.loads(text.getvalue())["measures"]
+    return rows
 
 
 def self_mapped() -> dict[str, float]:

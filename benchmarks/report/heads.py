@@ -1,4 +1,4 @@
-"""One shipped head at three sizes: as it is, and subdivided once and twice."""
+"""One shipped head at three sizes: as it is, subdivided once, and subdivided twice with more vertices on top."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from samples import sample
 HEAD = "closed_head"
 """5,346 vertices in one skin: subdivided, all of them are skin."""
 
-SIZES = {"5k": 0, "20k": 1, "100k": 2}
-"""Subdivisions; each has four times the vertices."""
+SIZES = {"5k": (0, 0), "20k": (1, 0), "100k": (2, 100_000)}
+"""Subdivisions, each with four times the vertices, and how many vertices there are to be at least."""
 
 MOTIONS = 88
 
@@ -42,11 +42,28 @@ def sized(size: str) -> Sized:
     points = read_landmarks(path.with_suffix(".fps.json"), scene)
     shape = scene.shapes[0]
     mesh = shape.mesh
-    for _ in range(SIZES[size]):
+    subdivisions, least = SIZES[size]
+    for _ in range(subdivisions):
         step = refine(mesh.indices, mesh.offsets, mesh.vertex_count)
         # Old vertices come first, so feature points stay on theirs.
         mesh = PolyMesh(step.matrix @ mesh.vertices, *step.polygons)
+    mesh = with_middles(mesh, least - mesh.vertex_count)
     return Sized(FaceScene((Shape(shape.name, mesh),), name=f"{HEAD}_{size}"), points)
+
+
+def with_middles(mesh: PolyMesh, count: int) -> PolyMesh:
+    """A mesh of quadrangles whose largest ones, `count` of them, are four triangles around a vertex in their middle."""
+    if count <= 0:
+        return mesh
+    quads = mesh.indices.reshape(-1, 4)
+    corners = mesh.vertices[quads]
+    area = np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1)
+    split = np.zeros(len(quads), dtype=bool)
+    split[np.argsort(-area, kind="stable")[:count]] = True
+    middles = mesh.vertex_count + np.arange(count)
+    fans = [np.stack([quads[split, k], quads[split, (k + 1) % 4], middles], axis=1) for k in range(4)]
+    faces = [*quads[~split], *np.concatenate(fans)]
+    return PolyMesh.from_faces(np.concatenate([mesh.vertices, corners[split].mean(axis=1)]), faces)
 
 
 def source() -> tuple[AnimatableFace, PreparedFace]:

@@ -10,8 +10,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
-ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
 def seconds(work: Callable[[], object], runs: int = 1) -> float:
@@ -29,11 +31,20 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def measured(module: str, *arguments: str) -> dict[str, float]:
-    """What a module prints as JSON, run in a process of its own."""
+def measured(
+    module: str, *arguments: str, folder: Path | None = None, setting: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """What a module prints as JSON, run in a process of its own.
+
+    Parameters
+    ----------
+    folder : of the program, None = this one.
+    setting : variables of the environment.
+    """
     command = [sys.executable, "-m", module, *arguments]
-    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, env={**os.environ, **ONE_THREAD})
-    found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    environment = {**os.environ, **ONE_THREAD, **(setting or {})}
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, env=environment, cwd=folder)
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return found
 
 
