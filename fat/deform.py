@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fba.arrays import Bools, Floats, Ints
 
-BLOCK_VERTICES = 512
-"""Vertices in one block. The columns of a block are those that move any vertex in it: small blocks skip more
-zeros, large ones multiply faster. Between 256 and 1,024 the speed is the same within 10 %."""
+TILE = 16
+"""Vertices in one tile. The columns of a tile are those that move any vertex in it: small tiles multiply fewer zeros,
+large ones multiply faster. Between 8 and 32 the speed of a face in full motion is the same within 10 %, at 512 half."""
 
-GATHER_BELOW = 0.6
-"""Columns that no frame of a batch uses are left out when fewer than this share of them is used; copying the
-others costs about as much as it saves above that."""
+WIDEST = 64
+"""Tiles in the longest stretch."""
+
+PRODUCT_COST = 200_000
+"""What one more product costs by itself, in multiplications: about 5 microseconds."""
+
+COPY_COST = 20
+"""What it costs to copy one number, in multiplications."""
+
+Number = TypeVar("Number", np.float64, np.float32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,62 +35,98 @@ class Column:
     slopes: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class _Block:
-    start: int
-    stop: int
-    columns: Ints
-    rows: Floats
-    """(1 + columns, 3 * vertices): the neutral vertices, then each column's slopes."""
+class Deformer(Generic[Number]):
+    """Neutral vertices plus weighted columns, by one matrix product for each stretch of vertices.
 
-
-class Deformer:
-    """Neutral vertices plus weighted columns, by one matrix product for each block of vertices.
+    Where many columns have weights, the stretches are tiles, whose rows are multiplied as they lie in memory. Where
+    few have, the stretches are longer, and the rows of the columns in use are copied first.
 
     Parameters
     ----------
     neutral : (n, 3).
     columns : K columns over these vertices; an index that occurs twice in a column counts twice.
+    number : type of the numbers that are multiplied and returned.
     """
 
-    def __init__(self, neutral: Floats, columns: Sequence[Column]) -> None:
-        self._count = len(neutral)
-        inside = [np.unique(c.index // BLOCK_VERTICES) for c in columns]
-        members: list[list[int]] = [[] for _ in range(0, self._count, BLOCK_VERTICES)]
-        for number, blocks in enumerate(inside):
-            for block in blocks.tolist():
-                members[block].append(number)
-        self._blocks = []
-        for block, numbers in enumerate(members):
-            start = block * BLOCK_VERTICES
-            stop = min(start + BLOCK_VERTICES, self._count)
-            rows = np.zeros((1 + len(numbers), stop - start, 3))
-            rows[0] = neutral[start:stop]
-            for row, number in enumerate(numbers, start=1):
-                column = columns[number]
-                here = (column.index >= start) & (column.index < stop)
-                np.add.at(rows[row], column.index[here] - start, column.slopes[here])
-            self._blocks.append(_Block(start, stop, np.array(numbers, np.int32), rows.reshape(len(rows), -1)))
+    def __init__(self, neutral: Floats, columns: Sequence[Column], number: type[Number]) -> None:
+        self.number: type[Number] = number
+        self._count: int = len(neutral)
+        first = _first_equal(columns)
+        self._order: NDArray[np.intp] = np.argsort(first, kind="stable")
+        distinct: Ints = np.unique(first)
+        self._starts: NDArray[np.intp] = np.searchsorted(first[self._order], distinct)
+        # Column 0 is the neutral face, whose weight is 1. Row 0 holds zeros, for tiles that a column does not move.
+        parts = [Column(np.arange(len(neutral), dtype=np.int32), neutral), *(columns[k] for k in distinct)]
+        tiles = -(-len(neutral) // (TILE * WIDEST)) * WIDEST
+        self._member: Bools = np.zeros((tiles, len(parts)), dtype=bool)
+        self._member[:, 0] = True
+        for k, part in enumerate(parts):
+            self._member[part.index // TILE, k] = True
+        ids = np.cumsum(self._member, dtype=np.int32).reshape(self._member.shape)
+        self._row: Ints = np.where(self._member, ids, 0).astype(np.int32)
+        self._sizes = np.count_nonzero(self._member, axis=1)
+        self._rows: NDArray[Number] = np.zeros((1 + int(self._sizes.sum()), 3 * TILE), dtype=number)
+        flat = self._rows.reshape(-1)
+        for k, part in enumerate(parts):
+            places = 3 * (TILE * self._row[part.index // TILE, k] + part.index % TILE)
+            np.add.at(flat, (places[:, None] + np.arange(3)).ravel(), part.slopes.astype(number).ravel())
+        self._columns = [np.flatnonzero(m).astype(np.int32) for m in self._member]
+        self._tiles: list[NDArray[Number]] = np.split(self._rows[1:], np.cumsum(self._sizes)[:-1])
 
-    def __call__(self, weights: Floats) -> Floats:
+    def __call__(self, weights: Floats) -> NDArray[Number]:
         """Return the vertices (f, n, 3) at weights (f, K).
 
         A vertex whose columns have no weight keeps its neutral value exactly: the product only adds zeros.
         """
-        frames = len(weights)
-        out = np.empty((frames, self._count * 3))
-        active: Bools = np.asarray(weights.any(axis=0))
-        for block in self._blocks:
-            target = out[:, 3 * block.start : 3 * block.stop]
-            columns, rows = block.columns, block.rows
-            used = active[columns]
-            count = int(used.sum())
-            if count == 0:
-                target[:] = rows[0]
-                continue
-            if count < GATHER_BELOW * used.size:
-                columns, rows = columns[used], rows[np.concatenate([[0], 1 + np.flatnonzero(used)])]
-            factors = np.ones((frames, 1 + columns.size))
-            factors[:, 1:] = weights[:, columns]
-            np.matmul(factors, rows, out=target)
-        return out.reshape(frames, self._count, 3)
+        factors: NDArray[Number] = np.ones((self._member.shape[1], len(weights)), dtype=self.number)
+        factors[1:] = np.add.reduceat(weights.T[self._order], self._starts, axis=0)
+        out: NDArray[Number] = np.empty((len(weights), 3 * self._count), dtype=self.number)
+        start = 0
+        for columns, rows in self._products(factors):
+            target = out[:, start : start + rows.shape[1]]
+            start += rows.shape[1]
+            if columns.size == 1:
+                target[:] = rows[0, : target.shape[1]]
+            else:
+                np.matmul(factors.take(columns, axis=0).T, rows[:, : target.shape[1]], out=target)
+        return out.reshape(len(weights), self._count, 3)
+
+    def _products(self, factors: NDArray[Number]) -> Iterator[tuple[Ints, NDArray[Number]]]:
+        """Columns (k,) and their rows (k, numbers) of each stretch of vertices; the last stretches may be empty."""
+        active: Ints = np.flatnonzero(factors.any(axis=1)).astype(np.int32)
+        frames = factors.shape[1]
+        width, used = _stretches(self._member[:, active], frames)
+        as_they_lie = np.zeros(len(used), dtype=bool)
+        if width == 1:
+            # No copy, but rows without weights are multiplied, too.
+            as_they_lie = self._sizes * frames <= np.count_nonzero(used, axis=1) * (frames + COPY_COST)
+        for number, whole in enumerate(as_they_lie.tolist()):
+            if whole:
+                yield self._columns[number], self._tiles[number]
+            else:
+                columns = active[used[number]]
+                row = self._row[width * number : width * (number + 1)].take(columns, axis=1)
+                yield columns, self._rows.take(row.T, axis=0).reshape(columns.size, -1)
+
+
+def _stretches(used: Bools, frames: int) -> tuple[int, Bools]:
+    """How many tiles are best multiplied as one, and which columns each such stretch uses.
+
+    used : (tiles, columns), which columns each tile uses.
+    """
+    least, found, width = float(np.inf), (1, used), 1
+    while True:
+        numbers = 3 * TILE * width * np.count_nonzero(used)
+        cost = float(len(used) * PRODUCT_COST + numbers * (frames + (COPY_COST if width > 1 else 0)))
+        if cost < least:
+            least, found = cost, (width, used)
+        if width == WIDEST:
+            return found
+        used, width = used[0::2] | used[1::2], 2 * width
+
+
+def _first_equal(columns: Sequence[Column]) -> Ints:
+    """For each column the number (K,) of the first that equals it: faces often give two FAPs the same motion."""
+    numbers: dict[tuple[bytes, bytes], int] = {}
+    keys = ((c.index.tobytes(), c.slopes.tobytes()) for c in columns)
+    return np.array([numbers.setdefault(key, k) for k, key in enumerate(keys)], dtype=np.int32)

@@ -5,31 +5,34 @@ FAPs that fight when summed are shared first, by the rules of `fat.combine`; wit
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fat.build import check_indices
 from fat.chains import Chains
+from fat.columns import TableColumns
 from fat.combine import Combination
-from fat.deform import Column, Deformer
+from fat.deform import Deformer, Number
 from fat.face import AnimatableFace
-from fat.intervals import IntervalRule, interval_rule
-from fat.tables import FaceDefTable
-from fba.arrays import Bools, Floats, Ints
-from fba.errors import FaceDefTablesError, FapStreamError
-from fba.faps import EXPRESSION_FAP, FAP_COUNT, LOW_LEVEL_FAPS, VISEME_FAP, fap
+from fba.arrays import Bools, Floats, Floats32, Ints
+from fba.errors import FapStreamError
+from fba.faps import EXPRESSION_FAP, LOW_LEVEL_FAPS, VISEME_FAP, fap
 from fba.high_level import BLEND_MAX, expression_weights, viseme_weights
 from fba.scene import FaceScene
 from fba.stream import FapStream
 
 HighLevel = Literal["add", "high_only"]
 
-BATCH_FRAMES = 64
-"""Frames evaluated in one go; 20,000 vertices then take 31 MB."""
+BATCH_BYTES = 32 << 20
+"""Vertices evaluated in one go. Larger arrays come from the system anew for each batch, page by page, which halves the
+speed where few FAPs move."""
+
+BATCH_FRAMES = (32, 512)
+"""Frames evaluated in one go, at least and at most: few frames multiply slowly, more bring nothing."""
 
 _ROW = 64
 """Vertices whose coordinates are shifted as one row; see `_move_frames`."""
@@ -100,7 +103,7 @@ class Player:
         self._low = np.array([t.fap_id > EXPRESSION_FAP for t in self._tables], dtype=bool)
         self._order = face.scene.file_order()
         self._chains = Chains(face.scene, self._tables)
-        self._plan = _Plan(face, self._tables)
+        self._columns = TableColumns(face, self._tables)
         self._combination = Combination(face, rules)
 
     def pose(
@@ -138,23 +141,58 @@ class Player:
             values[0, k] = given.get(table.fap_id, 0.0) if source is None else source.get(table.high_level_select, 0.0)
         return next(self._poses(self._choose(values, np.array([bool(high[1] or high[2])]))))
 
-    def frames(self, stream: FapStream, batch: int = BATCH_FRAMES) -> Iterator[Pose]:
-        """Yield the face at each frame of a stream; FAPs that a frame does not speak of are 0 in it."""
-        for start in range(0, len(stream), batch):
-            yield from self._poses(self.table_values(stream, slice(start, start + batch)))
+    def frames(self, stream: FapStream, batch: int | None = None) -> Iterator[Pose]:
+        """Yield the face at each frame of a stream; FAPs that a frame does not speak of are 0 in it.
 
-    def world_frames(self, stream: FapStream, batch: int = BATCH_FRAMES) -> Iterator[Floats]:
-        """Yield (b, N, 3) vertices of up to `batch` frames: what `Pose.world` gives, without the detour."""
-        for start in range(0, len(stream), batch):
-            values = self.table_values(stream, slice(start, start + batch))
-            out = self._world_deformer(self._plan.weights(values))
+        batch : frames evaluated in one go; None to choose it by the memory that they take.
+        """
+        for part in self._batches(stream, batch, np.float64):
+            yield from self._poses(self.table_values(stream, part))
+
+    @overload
+    def world_frames(
+        self, stream: FapStream, batch: int | None = None, *, single: Literal[False] = False
+    ) -> Iterator[Floats]: ...
+
+    @overload
+    def world_frames(
+        self, stream: FapStream, batch: int | None = None, *, single: Literal[True]
+    ) -> Iterator[Floats32]: ...
+
+    def world_frames(
+        self, stream: FapStream, batch: int | None = None, *, single: bool = False
+    ) -> Iterator[Floats] | Iterator[Floats32]:
+        """Yield (b, N, 3) vertices of up to `batch` frames: what `Pose.world` gives, without the detour.
+
+        Parameters
+        ----------
+        batch : None to choose it by the memory that the frames take.
+        single : 4-byte numbers, for drawing: half the memory, twice the speed. A neutral frame is the neutral face
+            rounded to them; others are that exact to some units in the last place.
+        """
+        if single:
+            return self._world_frames(stream, batch, self._world_single)
+        return self._world_frames(stream, batch, self._world)
+
+    def _world_frames(
+        self, stream: FapStream, batch: int | None, deformer: Deformer[Number]
+    ) -> Iterator[NDArray[Number]]:
+        for part in self._batches(stream, batch, deformer.number):
+            values = self.table_values(stream, part)
+            out = deformer(self._columns.weights(values))
             for name, motion in self._chains.motions(values).items():
-                relative = motion.matrices @ self._chains.rest_inverse(name)
+                relative = (motion.matrices @ self._chains.rest_inverse(name)).astype(deformer.number)
                 _move_frames(out, _place(self._order[name]), relative, np.flatnonzero(motion.moving).tolist())
             yield out
 
+    def _batches(self, stream: FapStream, batch: int | None, number: type[Number]) -> Iterator[slice]:
+        frame = 3 * self.face.scene.vertex_count * np.dtype(number).itemsize
+        size = batch or int(np.clip(BATCH_BYTES // max(frame, 1), *BATCH_FRAMES))
+        for start in range(0, len(stream), size):
+            yield slice(start, start + size)
+
     def _poses(self, values: Floats) -> Iterator[Pose]:
-        local = self._local_deformer(self._plan.weights(values))
+        local = self._local(self._columns.weights(values))
         motions = self._chains.motions(values)
         places = {name: _place(ids) for name, ids in self._order.items()}
         for k, vertices in enumerate(local):
@@ -185,72 +223,27 @@ class Player:
         return self._combination(values)
 
     @cached_property
-    def _local_deformer(self) -> Deformer:
+    def _local(self) -> Deformer[np.float64]:
         scene = self.face.scene
         neutral = scene.gather({s.name: s.mesh.vertices for s in scene.shapes})
-        return Deformer(neutral, self._plan.columns({}))
+        return Deformer(neutral, self._columns.turned({}), np.float64)
 
     @cached_property
-    def _world_deformer(self) -> Deformer:
+    def _world(self) -> Deformer[np.float64]:
         """The same in world coordinates, with every Transform at rest."""
-        turned = {n: m[:3, :3] for n, m in self._chains.rest.items() if not np.array_equal(m, np.eye(4))}
-        if not turned:
-            return self._local_deformer
-        return Deformer(self.face.scene.world_neutral(), self._plan.columns(turned))
+        return self._in_world(np.float64) if self._turned else self._local
 
+    @cached_property
+    def _world_single(self) -> Deformer[np.float32]:
+        return self._in_world(np.float32)
 
-class _Plan:
-    """The intervals of all tables as columns; those with the same FAP and borders share a column."""
+    def _in_world(self, number: type[Number]) -> Deformer[Number]:
+        return Deformer(self.face.scene.world_neutral(), self._columns.turned(self._turned), number)
 
-    def __init__(self, face: AnimatableFace, tables: Sequence[FaceDefTable]) -> None:
-        self._order = face.scene.file_order()
-        counts = {s.name: s.mesh.vertex_count for s in face.scene.shapes}
-        self._starts: dict[tuple[int, bytes], int] = {}
-        rules: list[IntervalRule] = []
-        table_of: list[int] = []
-        units: list[float] = []
-        for number, table in enumerate(tables):
-            if not 1 <= table.fap_id <= FAP_COUNT:
-                raise FaceDefTablesError(f"fapID {table.fap_id} is not one of 1..{FAP_COUNT}")
-            unit = face.fapu.unit(fap(table.fap_id).unit)
-            for mesh in table.meshes:
-                check_indices(table, mesh, counts)
-                if not np.all(np.isfinite(mesh.displacements)):
-                    raise FaceDefTablesError(f"{table.name}: displacements of '{mesh.shape}' are not finite numbers")
-                key = (number, mesh.interval_borders.tobytes())
-                if key not in self._starts:
-                    self._starts[key] = len(table_of)
-                    rules.append(interval_rule(mesh.interval_borders))
-                    intervals = mesh.interval_borders.size - 1
-                    table_of += [number] * intervals
-                    units += [unit] * intervals
-        self._tables = tables
-        self._table_of = np.array(table_of, dtype=np.int32)
-        self._low, self._high, self._origin, sign = (
-            np.concatenate([np.zeros(0), *(getattr(r, part) for r in rules)])
-            for part in ("low", "high", "origin", "sign")
-        )
-        self._scale = sign * np.array(units)
-
-    def weights(self, values: Floats) -> Floats:
-        """Weights (f, K) of the columns at table values (f, tables)."""
-        clipped = np.clip(values[:, self._table_of], self._low, self._high)
-        weights: Floats = (clipped - self._origin) * self._scale
-        return weights
-
-    def columns(self, turned: Mapping[str, Floats]) -> list[Column]:
-        """All columns in the file's vertex order; slopes of `turned` shapes multiplied by a (3, 3) matrix."""
-        parts: list[list[tuple[Ints, Floats]]] = [[] for _ in self._table_of]
-        for number, table in enumerate(self._tables):
-            for mesh in table.meshes:
-                start = self._starts[number, mesh.interval_borders.tobytes()]
-                index = self._order[mesh.shape][mesh.coord_index]
-                for interval in range(mesh.interval_borders.size - 1):
-                    slopes = mesh.displacements[:, interval].astype(np.float64)
-                    if mesh.shape in turned:
-                        slopes = slopes @ turned[mesh.shape].T
-                    parts[start + interval].append((index, slopes))
-        return [Column(np.concatenate([i for i, _ in p]), np.concatenate([d for _, d in p])) for p in parts]
+    @cached_property
+    def _turned(self) -> dict[str, Floats]:
+        """Linear parts of the matrices of shapes that do not rest in world coordinates."""
+        return {n: m[:3, :3] for n, m in self._chains.rest.items() if not np.array_equal(m, np.eye(4))}
 
 
 def _place(ids: Ints) -> slice | Ints:
@@ -260,7 +253,7 @@ def _place(ids: Ints) -> slice | Ints:
     return ids
 
 
-def _move_frames(out: Floats, place: slice | Ints, matrices: Floats, frames: list[int]) -> None:
+def _move_frames(out: NDArray[Number], place: slice | Ints, matrices: NDArray[Number], frames: list[int]) -> None:
     """Transform the vertices at `place` in these frames of out (f, n, 3) by matrices (f, 4, 4), in place.
 
     Written for speed, as a turning head moves every vertex: one frame at a time stays in the processor's cache,

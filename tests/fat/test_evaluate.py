@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from literal_player import displacement, play, strip, turned_scene
 
 from fat import AnimatableFace, FaceDefMesh, FaceDefTable, FaceDefTables, FaceDefTransform, TransformField
-from fat.evaluate import Player
+from fat.evaluate import BATCH_BYTES, Player
 from fat.intervals import interval_weights
 from fba import FaceScene, FapStream, Fapu, FeaturePoints, PolyMesh, Shape, Transform
 from fba.errors import FaceDefTablesError, FapStreamError
@@ -124,6 +124,31 @@ def test_neutral_is_bit_identical() -> None:
         assert pose.world().tobytes() == face.scene.world_neutral().tobytes()
         for shape in face.scene.shapes:
             assert pose.local[shape.name].tobytes() == shape.mesh.vertices.tobytes()
+
+
+def test_single_precision_is_the_same_but_for_rounding() -> None:
+    face = random_face(4, [[-500, 0, 800], [0, 100]])
+    values = {n: [0, 300, -200, 900] for n in (3, 5, 19)}
+    turns = {n: [0, 0, 20000, -9000] for n in (23, 48, 49)}
+    stream = FapStream.build(25, 4, values | turns, [[0] * 4, [1, 10, 20, 0], [10, 0, 63, 0], [0] * 4])
+    player = Player(face)
+    (double,), (single,) = player.world_frames(stream), player.world_frames(stream, single=True)
+    assert (double.dtype, single.dtype) == (np.float64, np.float32)
+    assert np.array_equal(single[0], face.scene.world_neutral().astype(np.float32))
+    assert np.abs(single - double).max() < 1e-6 * np.abs(double).max()
+    assert (single[1:] != single[0]).any(axis=(1, 2)).all()
+    parts = list(player.world_frames(stream, batch=3, single=True))
+    assert [len(part) for part in parts] == [3, 1]
+    assert np.abs(np.concatenate(parts) - single).max() < 1e-6 * np.abs(double).max()
+
+
+def test_batches_are_chosen_by_the_memory_that_they_take() -> None:
+    scene = FaceScene((Shape("skin", PolyMesh.from_faces(np.zeros((20_000, 3)), [[0, 1, 2]])),))
+    player = Player(face_of(scene))
+    stream = FapStream.build(25, 150, {})
+    double, single = (next(player.world_frames(stream, single=single)) for single in (False, True))
+    assert double.nbytes <= BATCH_BYTES < 1.1 * double.nbytes
+    assert single.nbytes <= BATCH_BYTES < 1.1 * single.nbytes
 
 
 def test_high_level_values_are_those_of_the_frame() -> None:
