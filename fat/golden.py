@@ -18,13 +18,17 @@ from fba.arrays import Floats, Ints, frozen
 from fba.errors import FapStreamError
 from fba.faps import EXPRESSION_FAP, LOW_LEVEL_FAPS, VISEME_FAP
 from fba.faps import fap as fap_of
+from fba.fapu import FAPU_DIVISOR
 from fba.findings import Finding
-from fba.high_level import EXPRESSIONS, VISEMES
+from fba.high_level import BLEND_MAX, EXPRESSIONS, VISEMES
 from fba.orientation import to_file_order
 from fba.stream import FapStream
 
 TOLERANCE = 1.0
 """FAP units of the face's smallest FAPU by which a player may miss a vertex: what a stream cannot even say."""
+
+MIXED = ("two visemes", "two expressions", "several")
+"""What motions are called that do not play alone."""
 
 EVERY = 97
 """Of the vertices that are not among the most moved, each so many-th is kept."""
@@ -62,7 +66,8 @@ class Difference:
 
     Attributes
     ----------
-    name : the FAP, viseme or expression that moves alone in these frames; "several" where some play together.
+    name : the FAP, viseme or expression that moves alone in these frames; "two visemes", "two expressions", or
+        "several" where others play together.
     frames : how many frames.
     largest : the largest distance of a vertex from where it must be, in FAP units of the smallest FAPU.
     frame, vertex : where that is (index of the frame, number of the vertex in the file).
@@ -127,7 +132,8 @@ def compare(face: AnimatableFace, stream: FapStream, found: Golden, rules: Colle
 
     Returns
     -------
-    One entry for each FAP, viseme and expression that plays alone in some frame, one for all other frames.
+    One entry for each FAP, viseme and expression that plays alone in some frame, one each for two visemes, for two
+    expressions and for all other frames in which several play.
 
     Raises
     ------
@@ -144,15 +150,12 @@ def compare(face: AnimatableFace, stream: FapStream, found: Golden, rules: Colle
             f"the stream '{stream.name}' has {len(stream)} frames, but {len(found.frames)} are to be tested"
         )
     golden = record(face, stream, found.ids, rules)
-    unit = min(face.fapu.irisd0, face.fapu.es0, face.fapu.ens0, face.fapu.mns0, face.fapu.mw0) / 1024.0
+    unit = smallest_unit(face)
     _require_same_neutral(golden, found, unit)
     away = np.linalg.norm(found.frames - golden.frames, axis=2) / unit
     away[~np.isfinite(away)] = np.inf
-    groups: dict[str, list[int]] = {}
-    for k, name in enumerate(_names(face, stream)):
-        groups.setdefault(name, []).append(k)
     out = []
-    for name, rows in groups.items():
+    for name, rows in motion_rows(face, stream).items():
         frame, vertex = np.unravel_index(int(np.argmax(away[rows])), (len(rows), away.shape[1]))
         wanted = (golden.frames[rows] - golden.neutral).ravel()
         got = (found.frames[rows] - found.neutral).ravel()
@@ -162,6 +165,19 @@ def compare(face: AnimatableFace, stream: FapStream, found: Golden, rules: Colle
             Difference(name, len(rows), float(away[rows].max()), rows[int(frame)], int(golden.ids[int(vertex)]), factor)
         )
     return out
+
+
+def smallest_unit(face: AnimatableFace) -> float:
+    """One FAP unit of the face's smallest FAPU, in units of the mesh."""
+    return min(face.fapu.irisd0, face.fapu.es0, face.fapu.ens0, face.fapu.mns0, face.fapu.mw0) / FAPU_DIVISOR
+
+
+def motion_rows(face: AnimatableFace, stream: FapStream) -> dict[str, list[int]]:
+    """The frames of each motion, by its name (see `Difference`), in the order of the stream."""
+    rows: dict[str, list[int]] = {}
+    for k, name in enumerate(_names(face, stream)):
+        rows.setdefault(name, []).append(k)
+    return rows
 
 
 def _require_same_neutral(golden: Golden, found: Golden, unit: float) -> None:
@@ -180,10 +196,18 @@ def _names(face: AnimatableFace, stream: FapStream) -> Iterator[str]:
     tables: dict[tuple[int, int], FaceDefTable] = {t.key: t for t in face.tables}
     low = np.array(LOW_LEVEL_FAPS)
     for k in range(len(stream)):
-        playing = [fap_of(int(n)).name for n in low[(stream.values[k] * stream.mask[k])[low - 1] != 0]]
+        faps = [fap_of(int(n)).name for n in low[(stream.values[k] * stream.mask[k])[low - 1] != 0]]
+        visemes, expressions = [], []
         if stream.mask[k, VISEME_FAP - 1]:
-            playing += [VISEMES[int(s) - 1].name for s in stream.visemes[k, :2] if (VISEME_FAP, int(s)) in tables]
+            first, second, blend, _ = stream.visemes[k].tolist()
+            chosen = ((first, blend), (second, BLEND_MAX - blend))
+            visemes = [VISEMES[n - 1].name for n, share in chosen if share and (VISEME_FAP, n) in tables]
         if stream.mask[k, EXPRESSION_FAP - 1]:
-            chosen = stream.expressions[k, (0, 2)]
-            playing += [EXPRESSIONS[int(s) - 1].name for s in chosen if (EXPRESSION_FAP, int(s)) in tables]
-        yield playing[0] if len(playing) == 1 else ("several" if playing else "neutral")
+            first, one, second, two, *_ = stream.expressions[k].tolist()
+            chosen = ((first, one), (second, two))
+            expressions = [EXPRESSIONS[n - 1].name for n, share in chosen if share and (EXPRESSION_FAP, n) in tables]
+        playing = faps + visemes + expressions
+        if len(playing) == 1 or not playing:
+            yield playing[0] if playing else "neutral"
+        else:
+            yield MIXED[0] if playing == visemes else MIXED[1] if playing == expressions else MIXED[2]

@@ -64,7 +64,7 @@ def _viseme_rows() -> Ints:
     rows = []
     for viseme in VISEMES:
         other = viseme.id % len(VISEMES) + 1
-        rows += [(viseme.id, 0, BLEND_MAX, 0), (viseme.id, 0, 21, 0), (viseme.id, other, 40, 0)]
+        rows += [(viseme.id, 0, BLEND_MAX, 0), (viseme.id, 0, 21, 0), (0, viseme.id, 21, 0), (viseme.id, other, 40, 0)]
     return np.array(rows, dtype=np.int32)
 
 
@@ -73,7 +73,7 @@ def _expression_rows() -> Ints:
     for expression in EXPRESSIONS:
         other = expression.id % len(EXPRESSIONS) + 1
         rows += [(expression.id, BLEND_MAX, 0, 0, 0, 0), (expression.id, 20, 0, 0, 0, 0)]
-        rows.append((expression.id, 40, other, 30, 0, 0))
+        rows += [(0, 0, expression.id, 30, 0, 0), (expression.id, 40, other, 30, 0, 0)]
     return np.array(rows, dtype=np.int32)
 
 

@@ -67,7 +67,10 @@ def test_the_stream_plays_every_table_at_and_beyond_its_borders(face: Animatable
             assert borders <= set(column.tolist())
             if borders:
                 assert column.max() > max(borders)
-    assert set(range(15)) <= set(stream.visemes[:, 0].tolist())
+    for field in (stream.visemes[:, 0], stream.visemes[:, 1]):
+        assert set(range(15)) <= set(field.tolist())
+    for field in (stream.expressions[:, 0], stream.expressions[:, 2]):
+        assert set(range(7)) <= set(field.tolist())
     assert (stream.mask.sum(axis=1) > 10).sum() == 16
 
 
@@ -143,7 +146,7 @@ def test_a_player_that_stops_at_the_last_border_is_found(
 
 def test_what_cannot_be_compared_is_refused(face: AnimatableFace, stream: FapStream, golden: Golden) -> None:
     for broken, said in (
-        (replace(golden, frames=golden.frames[1:]), "720 frames, but 719"),
+        (replace(golden, frames=golden.frames[1:]), "740 frames, but 739"),
         (replace(golden, neutral=golden.neutral[:, ::-1]), "order, axes and units"),
         (replace(golden, ids=golden.ids + face.scene.vertex_count), "are of a vertex"),
     ):

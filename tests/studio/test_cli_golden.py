@@ -14,7 +14,7 @@ from fat.golden import record
 from fba.stream import FapStream
 from formats import read_face, write
 from formats.fap import write_fap
-from formats.golden import read_golden, write_golden
+from formats.golden import write_golden
 from samples import sample
 from studio.cli.app import app
 from studio.cli.outcome import Outcome
@@ -29,22 +29,34 @@ def fba(*words: object) -> Result:
 def test_the_shipped_frames_are_right() -> None:
     result = fba("check", "default", "--stream", "every_fap", "--golden", GOLDEN)
     assert result.exit_code == Outcome.OK, result.output
-    assert "88 of 88 motions are right" in result.stdout
+    assert "90 of 90 motions are right" in result.stdout
 
 
 def test_wrong_frames_are_findings_and_the_exit_code_says_so(tmp_path: Path) -> None:
-    """A player that moves half as far in the last frames."""
-    golden = read_golden(GOLDEN)
+    """A player that does not turn eyeballs, and moves too far in the frames in which several FAPs play."""
+    write(small_face(), tmp_path / "face.wrl")
+    face = read_face(tmp_path / "face.wrl")
+    stream = FapStream.build(25.0, 4, {3: [0, 100, 0, 700], 23: [0, 0, 20000, 9000]}, name="two")
+    write_fap(stream, tmp_path / "two.fap")
+    golden = record(face, stream)
     frames = golden.frames.copy()
-    frames[-30:] = golden.neutral + 0.5 * (frames[-30:] - golden.neutral)
+    frames[2] = golden.neutral
+    frames[3] = golden.neutral + 1.5 * (frames[3] - golden.neutral)
     write_golden(replace(golden, frames=frames), tmp_path / "mine.npz")
-    result = fba("check", "default", "--stream", "every_fap", "--golden", tmp_path / "mine.npz", "--json")
+    words = ("--stream", tmp_path / "two.fap", "--golden", tmp_path / "mine.npz")
+    result = fba("check", tmp_path / "face.wrl", *words, "--json")
     assert result.exit_code == Outcome.FINDINGS
     found = json.loads(result.stdout)
     assert not found["passed"]
     wrong = [m["name"] for m in found["motions"] if not m["passed"]]
-    assert wrong
+    assert wrong == ["yaw_l_eyeball", "several"]
     assert [f["where"] for f in found["findings"]] == wrong
+    assert [e["motions"] for e in found["explanations"]] == [["yaw_l_eyeball"]]
+    result = fba("check", tmp_path / "face.wrl", *words)
+    assert result.exit_code == Outcome.FINDINGS
+    assert "it seems that FaceDefTransforms are not played" in " ".join(result.stdout.split())
+    assert result.stdout.count("ERROR") == 1  # What is explained is not told twice.
+    assert "2 of 4 motions are right" in result.stdout
 
 
 def test_what_play_writes_can_be_checked(tmp_path: Path) -> None:
@@ -69,7 +81,7 @@ def test_what_play_writes_can_be_checked(tmp_path: Path) -> None:
         (("--golden", GOLDEN), Outcome.USAGE, "go together"),
         (("--stream", "demo", "--golden", GOLDEN, "--source", "default"), Outcome.USAGE, "does not go with"),
         (("--stream", "demo", "--golden", GOLDEN, "--rules", "magic"), Outcome.USAGE, "--rules"),
-        (("--stream", "demo", "--golden", GOLDEN), Outcome.BAD_INPUT, "150 frames, but 720"),
+        (("--stream", "demo", "--golden", GOLDEN), Outcome.BAD_INPUT, "150 frames, but 740"),
         (("--stream", "demo", "--golden", "no.npz"), Outcome.BAD_INPUT, "no.npz does not exist"),
     ],
 )
