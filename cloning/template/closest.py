@@ -3,36 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import astuple
-from itertools import chain
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 
-from cloning.labels import OPPOSITE
-from cloning.locate import Places, closest_on_triangles
+from cloning.locate import Places
+from cloning.template.balls import Balls, Nearby
+from cloning.template.boxes import BoxTree, box_tree, closest_loop
+from cloning.template.queries import Queries, Triangles, nowhere
 from fba.arrays import Bools, Floats, Ints
-
-FIRST = 4
-"""Triangles whose centres are nearest are tried first: they bound the distance."""
-
-MORE = 48
-"""Triangles tried where none of the first ones fits."""
+from fba.compiled import compiled
 
 BLOCK = 8192
-"""So many points are looked for at once ..."""
+"""So many points are looked for at once."""
 
-OPEN_BLOCK = 256
-"""... and so many of those for which no triangle near by fits: each of them has very many candidates."""
 
-FEWEST = 0.05
-"""A class of triangles of about one size holds at least this share of all, so that there are only a few."""
+class Memory:
+    """What is kept of points that are looked for again and again and move little: it saves time, changes no result."""
+
+    def __init__(self) -> None:
+        self.last: Ints | None = None
+        self.nearby: dict[int, Nearby] = {}
 
 
 class TriangleSearch:
     """A triangle surface, ready for queries.
-
-    Triangles are sorted into classes of about one size. The nearest centres give a bound for each point; a closer
-    triangle can only be one whose centre is nearer than the bound plus the largest radius of its class.
 
     Parameters
     ----------
@@ -45,25 +40,9 @@ class TriangleSearch:
     def __init__(
         self, vertices: Floats, triangles: Ints, labels: Ints | None = None, usable: Bools | None = None
     ) -> None:
-        from scipy.spatial import cKDTree
-
         self.triangles = triangles
-        self.corners = vertices[triangles]
-        a, b, c = (self.corners[:, k] for k in range(3))
-        cross = np.cross(b - a, c - a)
-        length = np.linalg.norm(cross, axis=1, keepdims=True)
-        self.normals = np.divide(cross, length, out=np.zeros_like(cross), where=length > 0.0)
-        self._bits = np.zeros(len(triangles), np.int32)
-        if labels is not None:
-            self._bits = np.bitwise_or.reduce(1 << labels[triangles].astype(np.int32), axis=1)
-        self._centers = self.corners.mean(axis=1)
-        self._radii = np.linalg.norm(self.corners - self._centers[:, None], axis=2).max(axis=1, initial=0.0)
-        some = np.arange(len(triangles)) if usable is None else np.flatnonzero(usable)
-        self._some: Ints = some.astype(np.int32)
-        self._all: Any = cKDTree(self._centers[some]) if len(some) else None
-        self._classes = [
-            (cKDTree(self._centers[ids]), ids, float(self._radii[ids].max())) for ids in _sizes(self._radii, self._some)
-        ]
+        self._triangles = Triangles.of(vertices, triangles, labels, usable)
+        self.corners, self.normals = self._triangles.corners, self._triangles.normals
 
     def closest(
         self,
@@ -72,9 +51,9 @@ class TriangleSearch:
         labels: Ints | None = None,
         least_facing: float = 0.5,
         reach: float | Floats = np.inf,
-        guesses: Ints | None = None,
+        memory: Memory | None = None,
     ) -> Places:
-        """Find the closest point of each query.
+        """Find the closest point of each query; the triangle of the lowest index where some are equally near.
 
         Parameters
         ----------
@@ -83,122 +62,61 @@ class TriangleSearch:
             cosine) do not count. None = all count.
         labels : (m,) labels of the points: triangles that touch the opposite label do not count.
         reach : nothing farther than this is found; one for all, or (m,).
-        guesses : (m,) a triangle that is likely to be near, -1 for none; it saves time and changes no result.
+        memory : of these points, with these labels and reach, and of this search alone.
 
         Returns
         -------
         Places; where there is none, the triangle is -1 and the distance infinite.
         """
-        m = len(points)
-        if m > BLOCK:
-            limits = np.broadcast_to(reach, m)
-            blocks = [
-                self.closest(
-                    points[some],
-                    None if normals is None else normals[some],
-                    None if labels is None else labels[some],
-                    least_facing,
-                    limits[some],
-                    None if guesses is None else guesses[some],
-                )
-                for some in (slice(start, start + BLOCK) for start in range(0, m, BLOCK))
-            ]
-            return Places(*(np.concatenate(part) for part in zip(*map(astuple, blocks), strict=True)))
-        best = Places(np.full(m, -1, np.int32), np.zeros((m, 3)), np.full(m, np.inf), np.full(m, -1.0))
-        if self._all is None or m == 0:
-            return best
-        refused = np.zeros(m, np.int32)
-        if labels is not None:
-            opposite = OPPOSITE[labels]
-            refused = np.where(opposite >= 0, 1 << np.maximum(opposite, 0), 0).astype(np.int32)
-        query = _Query(self, points, normals, refused, least_facing, best)
-        if guesses is not None:
-            guessed = np.flatnonzero(guesses >= 0).astype(np.int32)
-            query.offer(guessed, guesses[guessed])
-        for count in (FIRST, MORE):
-            open_rows = np.flatnonzero(best.triangles < 0)
-            if not len(open_rows):
-                break
-            k = min(count, len(self._some))
-            near = self._all.query(points[open_rows], k=k)[1].reshape(len(open_rows), k)
-            query.offer(np.repeat(open_rows, k), self._some[near].ravel())
-        limits = np.broadcast_to(reach, m)
-        bounded = best.triangles >= 0
-        still = np.flatnonzero(~bounded)
-        starts = range(0, len(still), OPEN_BLOCK)
-        for rows in (np.flatnonzero(bounded), *(still[start : start + OPEN_BLOCK] for start in starts)):
-            self._search(query, points, rows.astype(np.int32), limits)
-        far = best.distances > reach
-        best.triangles[far], best.distances[far], best.facing[far], best.weights[far] = -1, np.inf, -1.0, 0.0
-        return best
-
-    def _search(self, query: _Query, points: Floats, rows: Ints, limits: Floats) -> None:
-        """Try every triangle that can be nearer to some of the points than what they have."""
-        for tree, ids, radius in self._classes:
-            bound = np.minimum(query.best.distances[rows], limits[rows]) + radius
-            found = tree.query_ball_point(points[rows], bound, return_sorted=False)
-            counts = np.fromiter(map(len, found), np.int64, len(rows))
-            flat = np.fromiter(chain.from_iterable(found), np.int64, int(counts.sum()))
-            query.offer(np.repeat(rows, counts), ids[flat])
+        queries = Queries.of(points, normals, least_facing, labels, reach)
+        if not len(points) or not len(self._triangles.usable):
+            return nowhere(len(points))
+        found = self._walked(queries, memory)
+        return self._among_balls(queries, memory) if found is None else found
 
     def positions(self, places: Places) -> Floats:
         """(m, 3) the points found; meaningless where there is none."""
         found: Floats = np.einsum("nk,nkd->nd", places.weights, self.corners[places.triangles])
         return found
 
+    def _walked(self, queries: Queries, memory: Memory | None) -> Places | None:
+        """Closest points by the compiled loop, if there is one."""
+        loop = compiled(closest_loop)
+        if loop is None:
+            return None
+        tree, place = self._boxes
+        found = nowhere(len(queries))
+        guesses = np.full(len(queries), -1, np.int32)
+        if memory is not None and memory.last is not None:
+            guesses = np.where(memory.last >= 0, place[memory.last], -1).astype(np.int32)
+        points = np.ascontiguousarray(queries.points, np.float64)
+        normals = np.zeros((0, 3)) if queries.normals is None else np.ascontiguousarray(queries.normals, np.float64)
+        asked = points, normals, queries.refused, queries.least_facing, queries.limits, guesses
+        loop(*asked, tree, found.triangles, found.weights, found.distances, found.facing)
+        if memory is not None:
+            memory.last = found.triangles
+        return found
 
-class _Query:
-    """Pairs of points and triangles that are tried, and the best of them so far."""
+    def _among_balls(self, queries: Queries, memory: Memory | None) -> Places:
+        """Closest points by scipy's trees."""
+        blocks = []
+        for start in range(0, len(queries), BLOCK):
+            part = queries.part(slice(start, start + BLOCK))
+            nearby = None if memory is None else memory.nearby.setdefault(start, Nearby.of(part))
+            blocks.append(self._balls.closest(part, nearby))
+        if len(blocks) == 1:
+            return blocks[0]
+        return Places(*(np.concatenate(each) for each in zip(*map(astuple, blocks), strict=True)))
 
-    def __init__(
-        self,
-        search: TriangleSearch,
-        points: Floats,
-        normals: Floats | None,
-        refused: Ints,
-        least_facing: float,
-        best: Places,
-    ) -> None:
-        self._search, self._points, self._normals = search, points, normals
-        self._refused, self._least, self.best = refused, least_facing, best
+    @cached_property
+    def _balls(self) -> Balls:
+        return Balls(self._triangles)
 
-    def offer(self, rows: Ints, triangles: Ints) -> None:
-        """Try pairs: row of a point, in ascending order, and index of a triangle."""
-        search, best = self._search, self.best
-        away = self._points[rows] - search._centers[triangles]
-        near = np.sqrt(np.einsum("nd,nd->n", away, away)) - search._radii[triangles] < best.distances[rows]
-        kept = np.flatnonzero(near & (search._bits[triangles] & self._refused[rows] == 0))
-        rows, triangles = rows[kept], triangles[kept]
-        facing = np.ones(len(rows))
-        if self._normals is not None:
-            facing = np.einsum("nd,nd->n", self._normals[rows], search.normals[triangles])
-            kept = np.flatnonzero(facing >= self._least)
-            rows, triangles, facing = rows[kept], triangles[kept], facing[kept]
-        if not len(rows):
-            return
-        weights, distances = closest_on_triangles(self._points[rows], search.corners[triangles])
-        starts = np.flatnonzero(np.diff(rows, prepend=-1))
-        count = np.diff(starts, append=len(rows))
-        nearest = distances == np.repeat(np.minimum.reduceat(distances, starts), count)
-        # The lowest index wins where triangles are equally near, as at a common edge.
-        index = np.where(nearest, triangles, len(search.triangles))
-        chosen = np.flatnonzero(index == np.repeat(np.minimum.reduceat(index, starts), count))
-        chosen = chosen[distances[chosen] < best.distances[rows[chosen]]]
-        at = rows[chosen]
-        best.triangles[at], best.weights[at] = triangles[chosen], weights[chosen]
-        best.distances[at], best.facing[at] = distances[chosen], facing[chosen]
-
-
-def _sizes(radii: Floats, some: Ints) -> list[Ints]:
-    """Classes of triangles whose radii differ by a factor of two, small classes joined to the next larger one."""
-    if not len(some):
-        return []
-    size = np.floor(np.log2(np.maximum(radii[some], 1e-12)))
-    classes: list[Ints] = []
-    held = np.zeros(0, some.dtype)
-    for step in np.unique(size):
-        held = np.concatenate([held, some[size == step]])
-        if len(held) >= FEWEST * len(some):
-            classes.append(held)
-            held = held[:0]
-    return [*classes, held] if len(held) else classes
+    @cached_property
+    def _boxes(self) -> tuple[BoxTree, Ints]:
+        """A tree of boxes, and (t,) the place of each triangle in it, -1 for none."""
+        some = self._triangles
+        tree = box_tree(some.usable, some.corners, some.normals, some.bits)
+        place = np.full(len(some.corners), -1, np.int32)
+        place[tree.triangles] = np.arange(len(tree.triangles), dtype=np.int32)
+        return tree, place

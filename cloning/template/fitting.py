@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,10 +16,11 @@ from cloning.align import anchor_ids, warp_by_points
 from cloning.locate import closest_on_triangles
 from cloning.similarity import fit_similarity
 from cloning.surface import Surface
-from cloning.template.closest import TriangleSearch
+from cloning.template.closest import Memory, TriangleSearch
 from cloning.template.energies import energies
 from cloning.template.landmarks import landmarks_of
 from cloning.template.level import FEWEST, Level, welded
+from cloning.template.solver import Solver
 from cloning.visibility import visible as visible_vertices
 from fba.arrays import Bools, Floats, Ints
 
@@ -178,10 +178,10 @@ class _Fit:
         current = self._levels[-1].start
         for number in reversed(range(len(self._levels))):
             level = self._levels[number]
-            pull = _Pull(self._search, level)
+            pull, solver = _Pull(self._search, level), Solver()
             stop = schedule.steps - (schedule.fine or 0) * number
             for step in range(done, stop):
-                current = _stepped(level, current, pull, schedule.weights(step), schedule)
+                current = _stepped(level, current, pull, solver, schedule.weights(step), schedule)
                 if self._progress is not None:
                     self._progress((step + 1) / schedule.steps)
             done = stop
@@ -191,7 +191,12 @@ class _Fit:
 
 
 def _stepped(
-    level: Level, current: Floats, pull: _Pull, weights: tuple[float, float, float, float], schedule: Schedule
+    level: Level,
+    current: Floats,
+    pull: _Pull,
+    solver: Solver,
+    weights: tuple[float, float, float, float],
+    schedule: Schedule,
 ) -> Floats:
     """One solve: (n, 3) where the vertices go."""
     from scipy.sparse import diags_array
@@ -209,7 +214,7 @@ def _stepped(
         pulled, way = pull.ways(current)
         size = np.where(pulled, k_c * areas, 0.0)
         diagonal, right = diagonal + size, right + size[:, None] * way
-    return current + _solve(system + more + diags_array(diagonal), right)
+    return current + solver.solve(system + more + diags_array(diagonal), right)
 
 
 class _Pull:
@@ -219,6 +224,7 @@ class _Pull:
         self._search, self._level, self._labels = search, level, level.labels
         self._seen = np.flatnonzero(level.reach > 0.0)
         self._reach = level.reach[self._seen]
+        self._memory = Memory()
         self._last: Ints = np.full(len(level.start), -1, np.int32)
         self.pulled: Bools = np.zeros(len(level.start), bool)
 
@@ -227,7 +233,7 @@ class _Pull:
         seen = self._seen
         normals = self._level.normals(current)[seen]
         labels = None if self._labels is None else self._labels[seen]
-        found = self._search.closest(current[seen], normals, labels, FACING, self._reach, self._last[seen])
+        found = self._search.closest(current[seen], normals, labels, FACING, self._reach, self._memory)
         self._last[seen] = found.triangles
         self.pulled = self._last >= 0
         way = np.zeros_like(current)
@@ -240,15 +246,3 @@ class _Pull:
         some = self.pulled
         found[some] = closest_on_triangles(current[some], self._search.corners[self._last[some]])[1]
         return found
-
-
-def _solve(system: Any, right: Floats) -> Floats:
-    """Solve a symmetric positive definite system for (n, 3) right sides.
-
-    Finding the order of elimination costs less than a tenth of the factorisation, so it is not kept between steps.
-    """
-    from scipy.sparse.linalg import splu
-
-    lu = splu(system.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    solved: Floats = lu.solve(np.asfortranarray(right))
-    return solved

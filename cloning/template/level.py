@@ -51,7 +51,22 @@ class Level:
         """
         if self.finer is None:
             return vertex_normals(current, self.triangles)
-        return self.finer.level.normals(self.finer.spread(current - self.start))[self.finer.kept]
+        return self._rings.normals(current - self.start)
+
+    @cached_property
+    def _rings(self) -> Rings:
+        from scipy.sparse import eye_array
+
+        finest, own, matrix = self, np.arange(len(self.start), dtype=np.int32), eye_array(len(self.start), format="csr")
+        while finest.finer is not None:
+            own, matrix = finest.finer.kept[own], finest.finer.matrix @ matrix
+            finest = finest.finer.level
+        touched = np.zeros(len(finest.start), bool)
+        touched[own] = True
+        triangles = finest.triangles[touched[finest.triangles].any(axis=1)]
+        touched[triangles] = True
+        number = np.cumsum(touched) - 1
+        return Rings(finest.start[touched], matrix[np.flatnonzero(touched)], number[triangles], number[own])
 
     def coarser(self) -> Level:
         """A mesh of about a quarter of the vertices."""
@@ -84,6 +99,28 @@ class Finer:
         """(n, 3) where the finer mesh's vertices are when the coarser one's have gone (c, 3) ways from their start."""
         places: Floats = self.level.start + self.matrix @ ways
         return places
+
+
+@dataclass(frozen=True, eq=False)
+class Rings:
+    """The triangles of the finest mesh around the vertices of a coarser one.
+
+    Attributes
+    ----------
+    start : (r, 3) where their vertices start.
+    matrix : (r, c) sparse, spreads a field of the coarser mesh.
+    triangles : (t, 3) over them.
+    own : (c,) the coarser mesh's vertices among them.
+    """
+
+    start: Floats
+    matrix: Any
+    triangles: Ints
+    own: Ints
+
+    def normals(self, ways: Floats) -> Floats:
+        """(c, 3) unit normals when the coarser mesh's vertices have gone (c, 3) ways from their start."""
+        return vertex_normals(self.start + self.matrix @ ways, self.triangles)[self.own]
 
 
 def welded(surface: Surface, start: Floats, marks: Landmarks, reach: Floats, labels: Ints | None) -> Level:

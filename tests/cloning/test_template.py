@@ -1,4 +1,4 @@
-"""The elastic template: operators, energies, exact closest points, fits whose result is known."""
+"""The elastic template: operators, energies, fits whose result is known."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from remade import bare
+from scipy.sparse import diags_array
 
 from cloning.contours import contour_anchors
-from cloning.locate import closest_on_triangles
 from cloning.prepare import PreparedFace, prepare
 from cloning.similarity import fit_similarity
 from cloning.surface import Surface, build_surface
-from cloning.template.closest import TriangleSearch
 from cloning.template.coarse import coarser
 from cloning.template.correspondence import correspond
 from cloning.template.energies import energies, stiffness, vertex_areas
 from cloning.template.fitting import BENDING, PUBLISHED, Fitted, Schedule, fit_template
-from cloning.template.level import FEWEST
+from cloning.template.landmarks import landmarks_of
+from cloning.template.level import FEWEST, vertex_normals, welded
+from cloning.template.solver import Solver
 from cloning.visibility import visible
 from fat import AnimatableFace
 from fba import FaceScene, FeaturePoint, FeaturePoints, PolyMesh, Shape
@@ -117,41 +118,6 @@ def test_membrane_interpolates_linearly_and_bending_smoothly() -> None:
     assert np.allclose(solved[0][row], tent, atol=1e-6)
     assert solved[1][row][14] > tent[14] + 0.03, "round at the top, no cusp"
     assert abs(solved[1][row][15] - 1.0) < 0.3 * abs(tent[15] - 1.0)
-
-
-@pytest.mark.parametrize("facing", [-2.0, 0.5])
-def test_closest_points_are_those_of_brute_force(facing: float) -> None:
-    random = np.random.default_rng(3)
-    centers = random.random((400, 3))
-    size = np.exp(random.uniform(-5.0, 0.0, 400))
-    corners = centers[:, None] + size[:, None, None] * random.normal(size=(400, 3, 3))
-    search = TriangleSearch(corners.reshape(-1, 3), np.arange(1200).reshape(400, 3))
-    points = random.uniform(-0.5, 1.5, (300, 3))
-    normals = random.normal(size=(300, 3))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    found = search.closest(points, normals, None, facing)
-    distances = closest_on_triangles(points[:, None], corners[None])[1]
-    distances[normals @ search.normals.T < facing] = np.inf
-    assert np.allclose(found.distances, distances.min(axis=1), rtol=0, atol=1e-12)
-    assert np.allclose(np.linalg.norm(search.positions(found) - points, axis=1), found.distances, atol=1e-9)
-    guessed = search.closest(points, normals, None, facing, guesses=random.integers(-1, 400, 300).astype(np.int32))
-    assert np.array_equal(guessed.distances, found.distances), "guesses change nothing"
-    near = search.closest(points, normals, None, facing, reach=0.1)
-    assert np.array_equal(near.triangles >= 0, found.distances <= 0.1)
-    assert 0 < np.sum(near.triangles >= 0) < 300
-
-
-def test_closest_points_keep_to_their_own_lip() -> None:
-    mesh = sheet(11)
-    labels = np.where(mesh.vertices[:, 1] > 0.5, 1, 2)
-    search = TriangleSearch(mesh.vertices, mesh.triangles, labels)
-    points = np.array([[0.32, 0.2, 0.1], [0.32, 0.2, 0.1], [0.32, 0.2, 0.1]])
-    up = np.tile([0.0, 0.0, 1.0], (3, 1))
-    found = search.positions(search.closest(points, up, np.array([0, 1, 2])))
-    assert np.allclose(found[0], [0.32, 0.2, 0.0])
-    assert np.allclose(found[1], [0.32, 0.6, 0.0]), "the upper lip begins at 0.6"
-    assert np.allclose(found[2], [0.32, 0.2, 0.0])
-    assert search.closest(points, -up).triangles.tolist() == [-1, -1, -1], "the back of the sheet does not count"
 
 
 def test_a_similarity_is_found_exactly() -> None:
@@ -290,13 +256,23 @@ def test_anchors_on_the_lids_do_not_depend_on_how_the_head_is_held(head: Prepare
         assert np.allclose(tilted[name][1], turn @ place, atol=1e-9)
 
 
-def test_blocks_of_points_change_no_result(source: AnimatableFace, monkeypatch: pytest.MonkeyPatch) -> None:
-    skin = prepare(source.scene, source.feature_points, "source").skin
-    search = TriangleSearch(skin.vertices, skin.triangles)
-    points = skin.vertices[::9] + np.random.default_rng(2).normal(scale=0.1, size=skin.vertices[::9].shape)
-    whole = search.closest(points, skin.normals[::9], guesses=np.arange(len(points), dtype=np.int32))
-    monkeypatch.setattr("cloning.template.closest.BLOCK", 100)
-    parts = search.closest(points, skin.normals[::9], guesses=np.arange(len(points), dtype=np.int32))
-    assert np.array_equal(whole.triangles, parts.triangles)
-    assert np.array_equal(whole.distances, parts.distances)
-    assert np.array_equal(whole.weights, parts.weights)
+def test_a_coarser_mesh_has_the_normals_of_the_finest(head: PreparedFace) -> None:
+    marks = landmarks_of(head.skin, head.skin, (), None)
+    finest = welded(head.skin, head.skin.vertices, marks, np.zeros(head.skin.vertex_count), None)
+    coarse = finest.coarser().coarser()
+    current = coarse.start + 0.1 * np.sin(5.0 * coarse.start[:, [1, 2, 0]])
+    assert coarse.finer is not None
+    finer = coarse.finer.level
+    assert finer.finer is not None
+    whole = finer.finer.spread(coarse.finer.spread(current - coarse.start) - finer.start)
+    normals = vertex_normals(whole, finest.triangles)[finer.finer.kept[coarse.finer.kept]]
+    assert np.allclose(coarse.normals(current), normals, rtol=0, atol=1e-12)
+
+
+def test_the_order_of_elimination_is_kept_and_changes_no_solution() -> None:
+    flat = sheet(12, seed=3)
+    found, right = energies(flat.vertices, flat.triangles), np.random.default_rng(1).normal(size=(144, 3))
+    solver = Solver()
+    for k_s, k_b in ((1.0, 1e-3), (0.1, 1e-4), (0.0, 1.0)):
+        system = found.system(k_s, k_b) + diags_array(found.areas)
+        assert np.allclose(solver.solve(system, right), np.linalg.solve(system.toarray(), right), rtol=1e-9, atol=1e-9)
