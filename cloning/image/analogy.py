@@ -13,14 +13,13 @@ from cloning.image.color import Planes, UInt8, is_grey, luminance, relit, to_rgb
 from cloning.image.eri import ratio_image
 from cloning.image.mask import (
     bounds,
-    contour,
-    depth_within,
     face_mask,
     mouth_opening,
     region_share,
     slit_mask,
     widened,
 )
+from cloning.image.picture import AnalogyResult, Picture
 from cloning.image.points import (
     EYES,
     MOUTH,
@@ -49,46 +48,6 @@ not depend on the size of the picture. docs/analogy.md says what it does and how
 SHUT, PARTED = 0.07, 0.03
 """Gap up to which lips count as shut, and by how much an expression must open them, in widths of the mouth. Detected on
 the shared photographs, shut lips have gaps up to 0.06, lips that show teeth from 0.08 on."""
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """A photograph with its feature points.
-
-    Attributes
-    ----------
-    rgb : (h, w, 3) uint8.
-    points : name -> (x, y), see `cloning.image.points`.
-    """
-
-    rgb: UInt8
-    points: Places
-
-
-@dataclass(frozen=True, eq=False)
-class AnalogyResult:
-    """The target with the source's expression.
-
-    Attributes
-    ----------
-    rgb : (h, w, 3) uint8; where `changed` is False bit-identical to the target.
-    luminance : (h, w) before rounding and clipping.
-    changed : (h, w) True where, in the face's region, the warp moved a pixel or the mask let it change.
-    points : where the target's points are now.
-    steps : of the iteration; 0 where the matrix is factored.
-    teeth : True where the source's mouth was shown.
-    turned : how much the source's head turned between its pictures: see `cloning.image.points.turned`.
-    relit : how different the light of the source's two pictures is: see `cloning.image.color.relit`.
-    """
-
-    rgb: UInt8
-    luminance: Planes
-    changed: Bools
-    points: dict[str, tuple[float, float]]
-    steps: int
-    teeth: bool
-    turned: float
-    relit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,14 +112,14 @@ class Analogy:
         self._grey = is_grey(target.rgb)
         self._unit = eye_separation(target.points)
         self._across = source_to_target(self._source, self._target, self._names)
-        self._sharp, self._colours = Sampler(self._yuv[:1]), Sampler(self._yuv[1:], 1)
+        self._sharp, self._colours = Sampler(self._yuv[0]), Sampler(self._yuv[1:], 1)
         self._neutral = Sampler(luminance(source.rgb), shrink=1.0 / self._across.scale)
         fine = [refined(self._moved(points)) for points in expressions]
         self._box = self._box_of(fine)
         self._domain = self._domain_of(fine)
         self._near = widened(self._domain)
         self._inside = bounds(self._domain)
-        self._resting = depth_within(contour(self._target), self._box)
+        self._resting = region_share(self._target, self._unit, self._box)
         self._tents = TentTransfer(self._domain[self._inside], relief * self._unit / 255.0)
 
     @property
@@ -211,16 +170,20 @@ class Analogy:
     def _pasted(self, warped: Planes, face: Planes, moved: Bools) -> tuple[UInt8, Planes, Bools]:
         """The picture, its luminance, and where it changed: what moved in the face's region, over the target."""
         rows, columns = self._box
-        soft = np.flatnonzero((face < 1.0) & moved)
-        still = self._yuv[:, rows, columns].reshape(3, -1).take(soft, axis=1)
-        here = warped.reshape(3, -1)
-        mixed = here.take(soft, axis=1)
-        here[:, soft] = mixed + (1.0 - face.take(soft)) * (still - mixed)
+        here, still = warped.reshape(3, -1), self._yuv[:, rows, columns].reshape(3, -1)
+        border = np.flatnonzero((face < 1.0) & moved)
+        rest = 1.0 - face.ravel().take(border)
+        for plane, other in zip(here, still, strict=True):
+            mixed = plane.take(border)
+            plane[border] = mixed + rest * (other.take(border) - mixed)
         inside = moved & (face > 0)
         changed = np.zeros(self._picture.shape[:2], bool)
         changed[rows, columns] = inside
         rgb, whole = self._picture.copy(), self._yuv[0].copy()
-        rgb[changed] = to_rgb(here.take(np.flatnonzero(inside), axis=1))
+        for channel, found in zip(
+            rgb[rows, columns].T, to_rgb(here.take(np.flatnonzero(inside), axis=1)).T, strict=True
+        ):
+            channel.T[inside] = found
         whole[rows, columns] = warped[0]
         return rgb, whole, changed
 
@@ -250,7 +213,7 @@ class Analogy:
         labels = label_pixels(mesh, self._box)
         mask = np.where(self._domain & (labels >= 0), face_mask(moved, self._box), np.float32(0.0))
         skin = 1.0 - slit_mask(mesh, labels, moved, EYES)
-        face = region_share(np.maximum(self._resting, depth_within(contour(places), self._box)), self._unit)
+        face = np.maximum(self._resting, region_share(places, self._unit, self._box))
         own = {n: expression[n] for n in self._names}
         across = source_to_target(own, self._target, self._names)
         corners = _corners(mesh, refined(own), across)
@@ -262,22 +225,25 @@ class Analogy:
         goals = np.concatenate([to_array(self._fine_target, warp.mesh.names), warp.mesh.ring])
         places = mapped(warp.mesh.affine(goals), pixels)
         off = (np.abs(places[0] - pixels.x) > 1e-6) | (np.abs(places[1] - pixels.y) > 1e-6)
-        rows, columns, places = pixels.rows[off], pixels.columns[off], places[:, off]
+        moved = np.flatnonzero(off)
+        at, places = pixels.at.take(moved), places.take(moved, axis=1)
         planes = self._yuv[:, self._box[0], self._box[1]].copy()
-        planes[:1, rows, columns] = self._sharp.at(places)
-        planes[1:, rows, columns] = self._colours.at(places)
+        y, u, v = planes.reshape(3, -1)
+        y[at] = self._sharp.at(places)
+        u[at], v[at] = self._colours.at(places)
         displaced = np.zeros(warp.labels.shape, bool)
-        displaced[rows, columns] = True
+        displaced.ravel()[at] = True
         return planes, displaced
 
     def _source_pair(self, warp: _Warp, asked: Bools, expression: Picture) -> tuple[Planes, Planes]:
         """Luminance of the source's two pictures at the pixels of the warped target; zero where nothing is asked."""
         pixels = covered(warp.labels, asked, self._box)
         pair = np.zeros((2, *warp.labels.shape), np.float32)
+        neutral, posed = pair.reshape(2, -1)
         still = _corners(warp.mesh, self._fine_source, self._across)
-        pair[0, pixels.rows, pixels.columns] = self._neutral.at(mapped(warp.mesh.affine(still), pixels))
+        neutral[pixels.at] = self._neutral.at(mapped(warp.mesh.affine(still), pixels))
         rgb, moved = part_around(expression.rgb, mapped(warp.mesh.affine(warp.expression), pixels), warp.shrink)
-        pair[1, pixels.rows, pixels.columns] = Sampler(luminance(rgb), shrink=warp.shrink).at(moved)
+        posed[pixels.at] = Sampler(luminance(rgb), shrink=warp.shrink).at(moved)
         return pair[0], pair[1]
 
     def _opens(self, expression: Places, moved: Places) -> bool:
@@ -290,14 +256,14 @@ class Analogy:
         share = slit_mask(warp.mesh, warp.labels, warp.moved, MOUTH) * (warp.labels >= 0)
         shown = share > 0
         pixels = covered(warp.labels, shown, self._box)
-        if len(pixels.rows):
-            here = share[pixels.rows, pixels.columns]
+        if len(pixels.at):
+            here, flat = share.ravel().take(pixels.at), warped.reshape(3, -1)
             rgb, places = part_around(expression.rgb, mapped(warp.mesh.affine(warp.expression), pixels), warp.shrink)
             inside = Sampler(to_yuv(rgb), 1, warp.shrink).at(places)
             if self._grey:
                 inside[1:] = 0.0
-            outside = warped[:, pixels.rows, pixels.columns]
-            warped[:, pixels.rows, pixels.columns] = outside + here * (inside - outside)
+            outside = flat.take(pixels.at, axis=1)
+            flat[:, pixels.at] = outside + here * (inside - outside)
         return shown
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from cloning.image.color import Planes
@@ -77,47 +79,97 @@ def _hull(points: Floats) -> Floats:
     return corners
 
 
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """The sides of a convex polygon: the depth behind one at (x, y) is `up` (y - y0) - `left` (x - x0), in pixels."""
+
+    up: Planes
+    left: Planes
+    x0: Planes
+    y0: Planes
+
+    @classmethod
+    def of(cls, corners: Floats) -> _Sides:
+        """Of (k, 2) corners."""
+        middle = corners.mean(axis=0)
+        along = np.roll(corners, -1, axis=0) - corners
+        along /= np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
+        inside = np.sign(along[:, 0] * (middle[1] - corners[:, 1]) - along[:, 1] * (middle[0] - corners[:, 0]))
+        return cls(*(part.astype(np.float32) for part in (*(inside[:, None] * along).T, *corners.T)))
+
+    def depth(self, x: Planes, y: Planes) -> Planes:
+        """The depth of places whose x and y are given, or can be spread to the same shape."""
+        depth: Planes = np.full(np.broadcast_shapes(x.shape, y.shape), np.inf, np.float32)
+        behind = np.empty_like(depth)
+        for up, left, x0, y0 in zip(self.up, self.left, self.x0, self.y0, strict=True):
+            np.subtract(up * (y - y0), left * (x - x0), out=behind)
+            np.minimum(depth, behind, out=depth)
+        return depth
+
+    def span(self, y: Planes, depth: float) -> tuple[Planes, Planes]:
+        """(n, 1) first and last x in rows (n,) that are so deep; the last before the first where there is none."""
+        room = self.up * (y[:, None] - self.y0) + self.left * self.x0 - np.float32(depth)
+        steep = np.where(np.abs(self.left) < 1e-6, np.float32(1e-6), self.left)
+        ends = room / steep
+        first = np.where(steep < 0, ends, -np.inf).max(axis=1, keepdims=True)
+        last = np.where(steep > 0, ends, np.inf).min(axis=1, keepdims=True)
+        return first, last
+
+
 def depth_within(corners: Floats, box: tuple[slice, slice]) -> Planes:
     """How deep each pixel of a box lies in a convex polygon, in pixels; less than 0 outside."""
-    middle = corners.mean(axis=0)
-    rows, columns = box
-    y, x = (np.arange(part.start, part.stop, dtype=np.float32) for part in (rows, columns))
-    depth = np.full((y.size, x.size), np.inf, np.float32)
-    across = np.empty_like(depth)
-    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
-        inside = np.sign(along[0] * (middle[1] - a[1]) - along[1] * (middle[0] - a[0]))
-        up, left = np.float32(inside * along[0]), np.float32(inside * along[1])
-        np.subtract((up * (y - np.float32(a[1])))[:, None], (left * (x - np.float32(a[0])))[None, :], out=across)
-        np.minimum(depth, across, out=depth)
-    return depth
+    y, x = _rows_and_columns(box)
+    return _Sides.of(corners).depth(x[None, :], y[:, None])
+
+
+def soft_within(corners: Floats, box: tuple[slice, slice], reach: float, width: float) -> Planes:
+    """How much of each pixel of a box is a convex polygon's, 0..1.
+
+    Parameters
+    ----------
+    corners : (k, 2).
+    reach : how far around it, in pixels, the border ends.
+    width : of the border, in pixels.
+    """
+    sides, (y, x) = _Sides.of(corners), _rows_and_columns(box)
+    outer, inner = sides.span(y, -reach - 1.0), sides.span(y, width - reach + 1.0)
+    share = ((x >= inner[0]) & (x <= inner[1])).astype(np.float32)
+    border = np.flatnonzero((x >= outer[0]) & (x <= outer[1]) & (share == 0))
+    rows, columns = np.divmod(border, len(x))
+    depth = sides.depth(x[columns], y[rows])
+    share.ravel()[border] = smooth((depth + np.float32(reach)) / np.float32(width))
+    return share
+
+
+def _rows_and_columns(box: tuple[slice, slice]) -> tuple[Planes, Planes]:
+    y, x = (np.arange(part.start, part.stop, dtype=np.float32) for part in box)
+    return y, x
 
 
 def face_mask(moved: Places, box: tuple[slice, slice]) -> Planes:
     """How much each pixel of a box is relit, 0..1: 0 outside the face's convex hull, 1 well inside."""
     corners = outline(moved)
     middle = corners.mean(axis=0)
-    depth = depth_within(middle + INSET * (corners - middle), box)
-    return smooth(depth / np.float32(FEATHER * eye_separation(moved)))
+    return soft_within(middle + INSET * (corners - middle), box, 0.0, FEATHER * eye_separation(moved))
 
 
-def region_share(depth: Planes, unit: float) -> Planes:
-    """How much of each pixel is the warped face's, 0..1; the rest is the target's as it was.
+def region_share(places: Places, unit: float, box: tuple[slice, slice]) -> Planes:
+    """How much of each pixel of a box is the warped face's, 0..1; the rest is the target's as it was.
 
     Parameters
     ----------
-    depth : how deep the pixels lie within the face's contour, see `depth_within`.
-    unit : the eye separation in pixels.
+    places : of the face's points.
+    unit : the target's eye separation in pixels.
     """
-    return smooth((depth / np.float32(unit) + np.float32(REACH + BORDER)) / np.float32(BORDER))
+    return soft_within(contour(places), box, (REACH + BORDER) * unit, BORDER * unit)
 
 
-def bounds(domain: Bools) -> tuple[slice, slice]:
-    """Rows and columns of a domain, two more on each side."""
+def bounds(domain: Bools, more: int = 2) -> tuple[slice, slice]:
+    """Rows and columns of a domain, and so many more on each side as there are."""
     found = []
     for axis in (1, 0):
         at = np.flatnonzero(domain.any(axis=axis))
-        found.append(slice(int(at[0]) - 2, int(at[-1]) + 3))
+        found.append(slice(max(int(at[0]) - more, 0), int(at[-1]) + more + 1))
     return found[0], found[1]
 
 
@@ -139,9 +191,13 @@ def slit_mask(mesh: WarpMesh, labels: Ints, moved: Places, slits: Slits) -> Plan
     for upper, lower in slits:
         within[mesh.of_names({*rim_names(upper, moved), *rim_names(lower, moved)})] = True
     inside: Bools = within[labels]
-    soft = max(RIM_FEATHER * eye_separation(moved), 0.5)
-    blurred: Planes = ndimage.gaussian_filter(inside.astype(np.float32), soft)
-    return smooth(2.0 * blurred - 0.5)
+    out = np.zeros(labels.shape, np.float32)
+    if inside.any():
+        soft = max(RIM_FEATHER * eye_separation(moved), 0.5)
+        around = bounds(inside, 1 + int(np.ceil(4.0 * soft)))
+        blurred: Planes = ndimage.gaussian_filter(inside[around].astype(np.float32), soft, truncate=4.0)
+        out[around] = smooth(2.0 * blurred - 0.5)
+    return out
 
 
 def mouth_opening(places: Places) -> float:

@@ -136,13 +136,12 @@ class Covered:
 
     Attributes
     ----------
-    rows, columns : (p,) in the box.
+    at : (p,) in the box, counted row by row.
     label : (p,) the triangle of each.
     x, y : (p,) in the picture.
     """
 
-    rows: Indices
-    columns: Indices
+    at: Indices
     label: Indices
     x: Floats
     y: Floats
@@ -150,9 +149,10 @@ class Covered:
 
 def covered(labels: Ints, where: Bools, box: tuple[slice, slice]) -> Covered:
     """Those of some pixels of a box that lie in a triangle, row by row."""
-    rows, columns = np.nonzero(where & (labels >= 0))
-    x, y = (columns + box[1].start).astype(np.float64), (rows + box[0].start).astype(np.float64)
-    return Covered(rows, columns, labels[rows, columns].astype(np.intp), x, y)
+    at = np.flatnonzero(where & (labels >= 0))
+    rows = at // labels.shape[1]
+    x, y = (at - labels.shape[1] * rows + box[1].start).astype(np.float64), (rows + box[0].start).astype(np.float64)
+    return Covered(at, labels.ravel().take(at).astype(np.intp), x, y)
 
 
 def mapped(affine: Floats, pixels: Covered) -> Floats:

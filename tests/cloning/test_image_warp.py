@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 from cloning.image.align import fit_similarity_2d
 from cloning.image.color import RGB_FROM_YUV, YUV_FROM_RGB, is_grey, to_rgb, to_yuv
 from cloning.image.eri import correlation, ratio_image
-from cloning.image.mask import BORDER, REACH, contour, depth_within, face_mask, mouth_opening, region_share
+from cloning.image.mask import BORDER, REACH, contour, depth_within, face_mask, mouth_opening, region_share, smooth
 from cloning.image.points import REQUIRED, face_points, moved_points, refined, to_array, turned
 from cloning.image.sampler import Sampler
 from cloning.image.warp import covered, label_pixels, mapped, ring_around, triangulate
@@ -167,8 +167,9 @@ def test_ratio_images() -> None:
 
 def test_the_region_of_the_face_covers_its_points_and_fades_around_them() -> None:
     corners = contour(points())
+    share = region_share(points(), UNIT, WHOLE)
     depth = depth_within(corners, WHOLE)
-    share = region_share(depth, UNIT)
+    assert share == pytest.approx(smooth((depth / UNIT + REACH + BORDER) / BORDER), abs=1e-5)
     for x, y in points().values():
         assert share[round(y), round(x)] == 1.0
     within = TriangleMesh2D(corners, Delaunay(corners).simplices)
@@ -183,6 +184,6 @@ def test_the_region_of_the_face_covers_its_points_and_fades_around_them() -> Non
 
 def test_a_contour_without_points_is_that_of_the_mean_face() -> None:
     bare = {name: points()[name] for name in REQUIRED}
-    full, guessed = (region_share(depth_within(contour(places), WHOLE), UNIT) for places in (points(), bare))
+    full, guessed = (region_share(places, UNIT, WHOLE) for places in (points(), bare))
     both = ((full > 0.5) & (guessed > 0.5)).sum() / ((full > 0.5) | (guessed > 0.5)).sum()
     assert both > 0.75
