@@ -27,12 +27,9 @@ from fba.stream import FapStream
 
 HighLevel = Literal["add", "high_only"]
 
-BATCH_BYTES = 32 << 20
-"""Vertices evaluated in one go. Larger arrays come from the system anew for each batch, page by page, which halves the
-speed where few FAPs move."""
-
-BATCH_FRAMES = (32, 512)
-"""Frames evaluated in one go, at least and at most: few frames multiply slowly, more bring nothing."""
+BATCH_BYTES = 512
+"""Frames evaluated in one go, counted in bytes of a coordinate: 64 frames in 8-byte numbers, 128 in 4-byte ones. More
+multiply faster, but 20,000 vertices then take 31 MB, and larger arrays come from the system anew, page by page."""
 
 _ROW = 64
 """Vertices whose coordinates are shifted as one row; see `_move_frames`."""
@@ -144,7 +141,7 @@ class Player:
     def frames(self, stream: FapStream, batch: int | None = None) -> Iterator[Pose]:
         """Yield the face at each frame of a stream; FAPs that a frame does not speak of are 0 in it.
 
-        batch : frames evaluated in one go; None to choose it by the memory that they take.
+        batch : frames evaluated in one go; None for `BATCH_BYTES`.
         """
         for part in self._batches(stream, batch, np.float64):
             yield from self._poses(self.table_values(stream, part))
@@ -166,9 +163,9 @@ class Player:
 
         Parameters
         ----------
-        batch : None to choose it by the memory that the frames take.
-        single : 4-byte numbers, for drawing: half the memory, twice the speed. A neutral frame is the neutral face
-            rounded to them; others are that exact to some units in the last place.
+        batch : None for `BATCH_BYTES`.
+        single : 4-byte numbers, for drawing: half the memory for a frame, twice the speed. A neutral frame is the
+            neutral face rounded to them; others are as exact, but for a few units in the last place.
         """
         if single:
             return self._world_frames(stream, batch, self._world_single)
@@ -185,9 +182,9 @@ class Player:
                 _move_frames(out, _place(self._order[name]), relative, np.flatnonzero(motion.moving).tolist())
             yield out
 
-    def _batches(self, stream: FapStream, batch: int | None, number: type[Number]) -> Iterator[slice]:
-        frame = 3 * self.face.scene.vertex_count * np.dtype(number).itemsize
-        size = batch or int(np.clip(BATCH_BYTES // max(frame, 1), *BATCH_FRAMES))
+    @staticmethod
+    def _batches(stream: FapStream, batch: int | None, number: type[Number]) -> Iterator[slice]:
+        size = batch or BATCH_BYTES // np.dtype(number).itemsize
         for start in range(0, len(stream), size):
             yield slice(start, start + size)
 
