@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
 import statistics
 import subprocess
 import sys
@@ -22,6 +21,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from benchmarks.report.processes import peak_memory
 
 if TYPE_CHECKING:
     from fat.face import AnimatableFace
@@ -89,7 +90,7 @@ def once(head: str, backend: str) -> dict[str, float]:
         write(face, path)
         size = path.stat().st_size / 1e6
     stages("write", 1.0)
-    whole, peak = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    whole, peak = time.process_time(), peak_memory()
     known = known_map(source, face, backend)
     vertices = float(scene.vertex_count)
     return {"whole": whole, **stages.seconds, "memory": peak, "size": size, "vertices": vertices, "known map": known}

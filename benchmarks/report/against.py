@@ -33,7 +33,7 @@ def against(revision: str, by_turns: Callable[[tuple[Side, Side]], Any]) -> dict
     revision : a commit of this repository.
     by_turns : measures both sides.
     """
-    commit, date = _git("log", "-1", "--format=%h %cs", revision).split()
+    commit, date = _git("log", "-1", "--format=%h %cs", revision, "--").split()
     numbers, page = (_file(revision, path) for path in (NUMBERS, PAGE))
     found = json.loads(numbers) if numbers else {}
     rows = found.get("fidelity") or fidelity_rows(page)
@@ -41,6 +41,10 @@ def against(revision: str, by_turns: Callable[[tuple[Side, Side]], Any]) -> dict
         packed = subprocess.run(["git", "archive", revision], cwd=ROOT, check=True, stdout=subprocess.PIPE).stdout
         with tarfile.open(fileobj=io.BytesIO(packed)) as files:
             files.extractall(name, filter="data")
+        if not (Path(name) / "benchmarks" / "clone_speed.py").exists():
+            raise SystemExit(
+                f"--against {revision}: this commit cannot time itself yet; name one with benchmarks/clone_speed.py"
+            )
         pairs = by_turns((Side(Path(name)), Side()))
     return {
         "commit": commit,
@@ -58,7 +62,10 @@ def _file(revision: str, path: str) -> str:
 
 
 def _git(*arguments: str) -> str:
-    return subprocess.run(["git", *arguments], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"--against: {done.stderr.strip()}; name a commit of this repository")
+    return done.stdout
 
 
 def fidelity_rows(page: str) -> list[dict[str, Any]]:

@@ -43,11 +43,12 @@ def compared(pairs: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> di
             "ratio": statistics.median(ratios),
             "least": min(ratios),
             "largest": max(ratios),
+            "pairs": len(pairs),
         }
     return found
 
 
 def beyond_noise(row: Mapping[str, float]) -> bool:
-    """The pairs agree that there is a change, and it is no small one."""
-    agreed = row["least"] > 1.0 or row["largest"] < 1.0
+    """Some pairs agree that there is a change, and it is no small one."""
+    agreed = row["pairs"] > 1 and (row["least"] > 1.0 or row["largest"] < 1.0)
     return agreed and abs(row["ratio"] - 1.0) > LEAST

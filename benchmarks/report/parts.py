@@ -14,8 +14,7 @@ from typing import Any
 from benchmarks.clone_speed import median
 from benchmarks.cross_kit import Agreement, mean
 from benchmarks.fidelity import DOCUMENTED
-from benchmarks.report import peers
-from benchmarks.report.against import against
+from benchmarks.report.against import ROOT, against
 from benchmarks.report.heads import SIZES
 from benchmarks.report.paired import Side, paired
 from benchmarks.report.processes import measured, medians
@@ -82,10 +81,9 @@ def transfers(run: Run) -> Any:
 
 def beside(run: Run) -> Any:
     """Public programs, as far as they and what they are measured on can be had."""
-    known = run.faces / "faces" / "makehuman"
     sizes = QUICK_SIZES[: 1 if run.quick else 2]
-    rows = peers.fits(known, sizes, run.runs) if known.is_dir() else []
-    return rows if run.peers is None else rows + peers.transfers(run.peers.resolve(), sizes, run.runs)
+    folder = "" if run.peers is None else str(run.peers)
+    return measured("benchmarks.report.peers", str(run.faces), folder, ",".join(sizes), str(run.runs))
 
 
 def fast(run: Run) -> Any:
@@ -105,7 +103,8 @@ def by_turns(sides: tuple[Side, Side], run: Run) -> dict[str, dict[str, dict[str
     found = {}
     for name in run.cloned:
         found[name] = paired(*sides, run.runs, "benchmarks.clone_speed", "--once", HEAD, name)
-    if not run.quick:
+    then = sides[0].folder or ROOT
+    if not run.quick and (then / "benchmarks" / "report" / "stages.py").exists():
         found["stages"] = paired(*sides, run.runs, "benchmarks.report.stages", "20k")
     return found
 
@@ -191,6 +190,6 @@ PARTS: dict[str, Callable[[Run], Any]] = {
     "fidelity": fidelity,
     "cross": cross,
 }
-QUICK = ("clones", "stages", "fast", "against", "peers", "pictures", "playback")
+QUICK = ("clones", "stages", "peers", "against", "pictures", "playback")
 TRUTH = ("fidelity", "cross")
 """Measured when they are asked for; nothing in them depends on the machine."""

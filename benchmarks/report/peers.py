@@ -1,13 +1,17 @@
 """Public programs in the same run, each beside ours on the same work, by turns.
 
-`trimesh.registration` comes from the package index; deformation transfer programs from checkouts that the user has
-made, see `benchmarks.report.programs`.
+    python -m benchmarks.report.peers FACES CHECKOUTS SIZES RUNS
+
+prints rows as JSON; CHECKOUTS may be "". `trimesh.registration` comes from the package index; deformation transfer
+programs from checkouts that the user has made, see `benchmarks.report.programs`.
 """
 
 from __future__ import annotations
 
 import contextlib
+import json
 import statistics
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,6 +28,15 @@ from samples.build.makehuman import open_makehuman
 OURS = "elastic, bending"
 SHEETS = {"1k": (32, 32), "5k": (71, 71), "20k": (142, 141)}
 """Rows and columns of the sheets that motion is mapped on."""
+
+
+def main() -> None:
+    faces, folder, sizes, runs = sys.argv[1:]
+    known = Path(faces) / "faces" / "makehuman"
+    rows = fits(known, sizes.split(","), int(runs)) if known.is_dir() else []
+    if folder:
+        rows += transfers(Path(folder).resolve(), sizes.split(","), int(runs))
+    print(json.dumps(rows))
 
 
 def fits(makehuman: Path, sizes: Sequence[str], runs: int) -> list[dict[str, Any]]:
@@ -105,3 +118,7 @@ def _medians(laps: Sequence[tuple[float, float]]) -> dict[str, float]:
         "seconds": statistics.median(b for _, b in laps),
         "ratio": statistics.median(b / a for a, b in laps),
     }
+
+
+if __name__ == "__main__":
+    main()

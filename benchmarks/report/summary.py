@@ -80,7 +80,7 @@ def _between(page: str, name: str) -> str:
 
 
 def _span(ratios: Sequence[float]) -> str:
-    low, high = f"{min(ratios):.1f}", f"{max(ratios):.0f}"
+    low, high = f"{min(ratios):.1f}", f"{max(ratios):,.0f}"
     return high if len(ratios) == 1 else f"{low} to {high}"
 
 

@@ -26,21 +26,21 @@ def section(found: Mapping[str, Any]) -> str:
         f"Commit {old['commit']} of {old['date']} beside this one. Both ran by turns in one run, each change is the "
         "median of the ratios of its pairs; in brackets what is less than 5 % or of which the pairs disagree.\n",
         tables.turn_table(old["pairs"], SECONDS),
-        bars_table(old["values"], bars.values(found)),
+        *bars_table(old["values"], bars.values(found)),
         fidelity_changes(changed_fidelity(old["fidelity"], found.get("fidelity", ()), LEAST)),
     ]
     return "\n".join(text)
 
 
-def bars_table(then: Mapping[str, float], now: Mapping[str, float]) -> str:
-    """Measured bars that do not depend on the machine, and what became of them."""
-    lines = [tables.head("what is asked", ["then", "now", ""])]
+def bars_table(then: Mapping[str, float], now: Mapping[str, float]) -> list[str]:
+    """Measured bars that do not depend on the machine, and what became of them; none where none is known of both."""
+    lines = []
     for bar in bars.BARS:
         old, new = bar.value(then), bar.value(now)
         if old is None or new is None or bar.on_the_clock:
             continue
         lines.append(f"| {bar.what} | {old:.3g} | {new:.3g} | {_verdict(bar, old, new)} |")
-    return "\n".join(lines) + "\n"
+    return ["\n".join([tables.head("what is asked", ["then", "now", ""]), *lines]) + "\n"] if lines else []
 
 
 def _verdict(bar: bars.Bar, old: float, new: float) -> str:

@@ -84,7 +84,8 @@ def test_changes_on_known_faces_are_told_by_size() -> None:
 
 def test_bars_then_and_now_leave_out_the_clock() -> None:
     then = {"truth, fit": 0.15, "whole clone": 20.0, "lip gap, MNS": 0.005, "flips, %": 0.1, "flips, %, source": 0.0}
-    text = bars_table(then, {**then, "truth, fit": 0.17, "whole clone": 5.0, "lip gap, MNS": 0.004})
+    assert bars_table(then, {}) == []
+    (text,) = bars_table(then, {**then, "truth, fit": 0.17, "whole clone": 5.0, "lip gap, MNS": 0.004})
     assert "| truth error, other topology, `fit` | 0.15 | 0.17 | **worse** |" in text
     assert "| lip gap, MNS | 0.005 | 0.004 | better |" in text
     assert "fba clone" not in text
@@ -94,10 +95,11 @@ def test_bars_then_and_now_leave_out_the_clock() -> None:
 def test_ratios_are_medians_of_pairs_and_noise_is_told() -> None:
     laps = [(10.0, 8.0), (20.0, 10.0), (10.0, 9.0)]
     found = compared([({"whole": a, "old": 1.0}, {"whole": b}) for a, b in laps])
-    assert found == {"whole": {"then": 10.0, "now": 9.0, "ratio": 0.8, "least": 0.5, "largest": 0.9}}
+    assert found == {"whole": {"then": 10.0, "now": 9.0, "ratio": 0.8, "least": 0.5, "largest": 0.9, "pairs": 3}}
     assert beyond_noise(found["whole"])
-    assert not beyond_noise({"ratio": 0.8, "least": 0.7, "largest": 1.1})
-    assert not beyond_noise({"ratio": 0.97, "least": 0.96, "largest": 0.98})
+    assert not beyond_noise({"ratio": 0.8, "least": 0.7, "largest": 1.1, "pairs": 3})
+    assert not beyond_noise({"ratio": 0.97, "least": 0.96, "largest": 0.98, "pairs": 3})
+    assert not beyond_noise({"ratio": 0.8, "least": 0.8, "largest": 0.8, "pairs": 1})
     pairs = {"fit": found, "stages": {"write .wrl": found["whole"], "vertices": found["whole"]}}
     text = tables.turn_table(pairs, 0.05)
     assert "| **whole** | 10.00 to 9.00 **x 0.80** |" in text
@@ -107,7 +109,7 @@ def test_ratios_are_medians_of_pairs_and_noise_is_told() -> None:
 
 def test_the_section_of_an_earlier_state_names_it() -> None:
     assert section({}) == NONE
-    row = {"then": 10.0, "now": 8.0, "ratio": 0.8, "least": 0.7, "largest": 0.9}
+    row = {"then": 10.0, "now": 8.0, "ratio": 0.8, "least": 0.7, "largest": 0.9, "pairs": 3}
     old = {"commit": "abc1234", "date": "2026-01-01", "pairs": {"fit": {"whole": row}}, "fidelity": [], "values": {}}
     assert "Commit abc1234 of 2026-01-01" in section({"against": old})
     assert "| against itself | commit abc1234 of 2026-01-01: whole clone 10.0 s, now 8.0 s (x 0.80)" in summary(
