@@ -1,14 +1,14 @@
 """Cloning grids: every source onto every target, by several backends, in pictures and numbers.
 
 After Pandzic (2001), figures 11 to 13: a row is one source on all targets, a column one target from all sources, and
-where the two are the same face it is shown as it is.
+where the two are the same face it is shown as it is. A source that is not among the targets stands in a column of its
+own, so that every row shows what was cloned.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
@@ -19,40 +19,18 @@ from fat.face import AnimatableFace
 from fat.quality import edge_stretch, fap_error, fap_values, feature_point_motion, flips, truth_error
 from fba.arrays import Floats
 from fba.errors import FbaError
-from fba.feature_points import FeaturePoints
 from fba.findings import Finding
-from fba.scene import FaceScene, Role
-from formats import read, read_face
+from fba.scene import Role
+from formats import read_face
+from studio.compared_faces import Model
 from studio.comparison import Cell, Comparison, Way
-from studio.inputs import points_of
 from studio.render import Figure, Renderer, make_renderer
 from studio.sheet import GAP, PAPER, TALL, PosePick, Sheet, UInt8
 
 Progress = Callable[[str, float], None]
 
-
-@dataclass(frozen=True, eq=False)
-class Model:
-    """A face of the comparison.
-
-    Attributes
-    ----------
-    name : the file's, without its extension.
-    path : as given; two models of one path are one face.
-    neutral : what was read, a plain scene or a face with tables.
-    points : feature points in the file's axes; None where they have to be found.
-    """
-
-    name: str
-    path: str
-    neutral: FaceScene | AnimatableFace
-    points: FeaturePoints | None
-
-
-def read_model(path: str) -> Model:
-    """Read a face with or without tables; "default" is the shipped source."""
-    found = read(path)
-    return Model(path if path == "default" else Path(path).stem, path, found, points_of(found, Path(path), None))
+BOTH_FIT = 145
+"""Width of a picture from which on both numbers fit below it, pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,19 +113,22 @@ def compare(
 
     Returns
     -------
-    A pair of faces that cannot be cloned leaves its cell empty, and a finding says why.
+    A pair of faces that cannot be cloned leaves its cell empty, a source that cannot be played has no row; findings
+    say why.
     """
-    comparer = _Comparer(targets, picks, ways, generations, cell, renderer or make_renderer(), progress)
-    steps = len(sources) * (len(ways) * len(targets) * (2 * generations - 1) + 1)
-    comparer.steps = steps
+    comparer = _Comparer(sources, targets, picks, ways, generations, cell, renderer or make_renderer(), progress)
     for source in sources:
-        comparer.add(source)
+        try:
+            comparer.add(source)
+        except FbaError as error:
+            comparer.findings.append(Finding("error", "left-out", f"left out as a source: {error}", source.name))
     return Comparison(tuple(comparer.cells), comparer.grids(), tuple(comparer.findings))
 
 
 class _Comparer:
     def __init__(
         self,
+        sources: Sequence[Model],
         targets: Sequence[Model],
         picks: Sequence[PosePick],
         ways: Sequence[Way],
@@ -163,7 +144,10 @@ class _Comparer:
         self.rows: list[_Row] = []
         self.findings: list[Finding] = []
         self.neutral: dict[str, UInt8] = {}
-        self.steps, self.done = 1, 0
+        self.steps, self.done = len(sources) * (len(ways) * len(targets) * (2 * generations - 1) + 1), 0
+        self.several = len(sources) > 1
+        among = {target.path for target in targets}
+        self.apart = [source for source in sources if source.path not in among]
 
     def add(self, source: Model) -> None:
         """All clones of one source: a row for each way and generation."""
@@ -179,6 +163,9 @@ class _Comparer:
         itself = [actor.draw(pose, self.width, self.renderer) for pose in poses]
         for way in self.ways:
             rows = [_Row(self._label(source, way, g)) for g in range(1, self.generations + 1)]
+            for row in rows if self.apart else ():
+                here = source in self.apart and way == self.ways[0] and row is rows[0]
+                row.add(itself if here else [self._blank()] * len(itself), ["source" if here else ""] * len(itself))
             for target in self.targets:
                 if target.path == source.path:
                     for row in rows:
@@ -189,10 +176,9 @@ class _Comparer:
             self.rows += rows
 
     def _label(self, source: Model, way: Way, generation: int) -> str:
-        parts = [source.name]
-        parts += [str(way)] if len(self.ways) > 1 or way.as_published else []
+        parts = [str(way)] if len(self.ways) > 1 or way.as_published else []
         parts += [f"generation {generation}"] if self.generations > 1 else []
-        return ", ".join(parts)
+        return ", ".join([source.name, *parts] if self.several or not parts else parts)
 
     def _animatable(self, model: Model) -> AnimatableFace:
         if isinstance(model.neutral, AnimatableFace):
@@ -228,7 +214,7 @@ class _Comparer:
                 for parts in zip(self.picks, own, found, first, strict=True)
             ]
             self.cells += cells
-            row.add([actor.draw(pose, self.width, self.renderer) for pose in poses], [_caption(c) for c in cells])
+            row.add([actor.draw(p, self.width, self.renderer) for p in poses], [_caption(c, self.width) for c in cells])
 
     def _generations(self, face: AnimatableFace, target: Model, way: Way) -> Iterator[AnimatableFace]:
         """The clone on the target; then, again and again, that one's clone on the source's mesh cloned once more."""
@@ -253,11 +239,15 @@ class _Comparer:
 
     def grids(self) -> tuple[Sheet, ...]:
         """One grid for each motion."""
-        neutral = [self.neutral.get(target.path, self._blank()) for target in self.targets]
+        shown = [*([self.apart[0]] if self.apart else []), *self.targets]
+        neutral = [self.neutral.get(model.path, self._blank()) for model in shown]
+        names = [model.name for model in shown]
+        if len(self.apart) > 1:
+            neutral[0], names[0] = self._blank(), ""
         out = []
         for k, pick in enumerate(self.picks):
             grid = Sheet(pick.caption)
-            grid.add_row("target", neutral, [target.name for target in self.targets])
+            grid.add_row("at rest", neutral, names)
             for number, row in enumerate(self.rows):
                 pictures = [pictures[k] for pictures in row.pictures]
                 captions = [captions[k] for captions in row.captions]
@@ -294,6 +284,6 @@ def _cell(
     )
 
 
-def _caption(cell: Cell) -> str:
+def _caption(cell: Cell, width: int) -> str:
     first = f"FP {100 * cell.fp_error:.1f} %" if cell.drift is None else f"drift {cell.drift:.2f}"
-    return f"{first}, flips {cell.flips:.1f} %"
+    return first if width < BOTH_FIT else f"{first}, flips {cell.flips:.1f} %"

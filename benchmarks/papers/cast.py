@@ -14,7 +14,7 @@ from fat.rig import unrig
 from formats import read_face, read_scene
 from formats.shapes import read_shapes
 from samples import sample
-from studio.comparing import Model, read_model
+from studio.compared_faces import Model, read_model
 
 HEADS = ("quad_head", "tri_head")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,14 @@ from studio.cli.outcome import Outcome, usage
 
 if TYPE_CHECKING:
     from studio.comparison import Comparison, Way
+
+
+COLUMNS = (
+    "FP error: difference of the FAP values that the feature points show, relative to the source's. flips: triangles "
+    "that turn over, of those that move. stretch: how far edges change in length, the 99th percentile of |log|. Beside "
+    "both the source's own."
+)
+DRIFT = "drift: distance of the skin's motion from the first generation's, relative to it."
 
 
 def compare(
@@ -38,10 +47,11 @@ def compare(
     as_json: AsJson = False,
 ) -> None:
     """Clone sources onto targets, and show and measure the same motion on all of them."""
+    from fba.errors import InputFileError
     from formats.files import require_folder
     from studio.cli.console import print_findings, print_json, progress
+    from studio.compared_faces import read_models
     from studio.comparing import compare as run
-    from studio.comparing import read_model
     from studio.motions import parse_motions
     from studio.sheet import save_png
 
@@ -52,13 +62,17 @@ def compare(
         usage(f"{output}: this call reads that file; choose another name")
     require_folder(output)
     picks = parse_motions(motion)
-    models = {name: read_model(name) for name in dict.fromkeys((*sources, *(targets or ())))}
-    rows = [models[name] for name in dict.fromkeys(sources)]
-    columns = [models[name] for name in dict.fromkeys(targets or sources)]
-    if all(row.path == column.path for row in rows for column in columns):
+    if len({*sources, *(targets or ())}) == 1:
         usage("a face cannot be compared with itself alone; name a second one, or --targets")
     with progress() as tell:
+        tell("reading the faces", 0.0)
+        models, left_out = read_models((*sources, *(targets or ())))
+        rows = [models[name] for name in dict.fromkeys(sources) if name in models]
+        columns = [models[name] for name in dict.fromkeys(targets or sources) if name in models]
+        if all(row.path == column.path for row in rows for column in columns):
+            raise InputFileError("; ".join(f"{f.where}: {f.message}" for f in left_out))
         result = run(rows, columns, picks, ways, generations=generations, cell=cell, progress=tell)
+        result = replace(result, findings=(*left_out, *result.findings))
         save_png(result.image(), output)
     if as_json:
         from studio.cli.console import findings_json
@@ -70,7 +84,9 @@ def compare(
         out = console()
         print_findings(result.findings, out)
         _print(result)
-        out.print(f"{output}: {len(rows)} sources, {len(columns)} targets, {len(picks)} motions")
+        counted = ((rows, "source"), (columns, "target"), (picks, "motion"))
+        said = ", ".join(f"{len(some)} {word}{'s' if len(some) != 1 else ''}" for some, word in counted)
+        out.print(f"{output}: {said}")
     if any(f.severity == "error" for f in result.findings):
         raise typer.Exit(Outcome.FINDINGS)
 
@@ -98,8 +114,11 @@ def _print(result: Comparison) -> None:
         for c in result.cells
     ]
     table("", ("source", "target", "backend", ">generation", "motion", *head), rows, console())
+    drifts = any(c.drift is not None for c in result.cells)
+    console().print(COLUMNS + (" " + DRIFT if drifts else ""))
     means = [(_way(m.backend, m.as_published), str(m.generation), str(m.cells), *_numbers(m)) for m in result.means()]
-    table("mean", ("backend", ">generation", ">cells", *head), means, console())
+    console().print("Mean of all cells:")
+    table("", ("backend", ">generation", ">cells", *head), means, console())
 
 
 def _way(backend: str, published: bool) -> str:

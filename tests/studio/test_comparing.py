@@ -120,6 +120,33 @@ def test_a_pair_that_cannot_be_cloned_is_a_finding(tmp_path: Path, monkeypatch: 
     assert (tmp_path / "g.png").exists()
 
 
+def test_a_face_that_cannot_be_used_does_not_lose_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file without a mesh, and one without a face; each is told once. The source stands in a column of its own."""
+    (tmp_path / "empty.obj").write_text("no mesh")
+    (tmp_path / "box.obj").write_text(
+        "\n".join([f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1)] + ["f 1 2 4 3", "f 5 6 8 7"])
+    )
+
+    def nothing(*_: object) -> None:
+        raise LandmarkError("no face was found in it")
+
+    monkeypatch.setattr("studio.compared_faces.detect_points", nothing)
+    bad = [tmp_path / "empty.obj", tmp_path / "box.obj"]
+    words = ("--targets", *bad, HEAD, "-o", tmp_path / "g.png", "--motion", "open_jaw", "--backends", "fmc")
+    result = fba("compare", "default", *words, "--cell", 60, "--json")
+    assert result.exit_code == Outcome.FINDINGS, result.output
+    found = json.loads(result.stdout)
+    assert [c["target"] for c in found["cells"]] == ["tri_head"]
+    assert [(f["code"], f["where"]) for f in found["findings"]] == [("left-out", str(path)) for path in bad]
+    image = np.asarray(Image.open(tmp_path / "g.png"))
+    face = read_face("default")
+    figure = Figure.of_face(face)
+    for value in ({}, {3: amplitudes()[3].positive}):
+        own = figure.draw(Player(face).pose(value).world_shapes(), (60, 72), figure.camera, make_renderer())
+        windows = np.lib.stride_tricks.sliding_window_view(image[:, -140:-80], own.shape, axis=(0, 1, 2))[:, 0, 0]  # type: ignore[call-overload]
+        assert (windows == own).all(axis=(1, 2, 3)).sum() == 1
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
