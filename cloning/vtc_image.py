@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from cloning.align import anchor_ids
 from cloning.backends import SkinTransfer
 from cloning.local_transfer import BareTransfer, carrying_map, goal_transfer
 from cloning.mesh_image import AROUND
@@ -34,12 +35,23 @@ def build_transfer(source: PreparedFace, target: PreparedFace, as_published: boo
     labels = source.labels.values, target.labels.values
     places = correspond(copy.vertices, copy.triangles, target.skin, labels=labels)
     skin_map = carrying_map(target.skin, places, without=target.labels.between)
-    vertices = _placed(copy, skin)
+    vertices, seen = _placed(copy, skin), _seen(skin, target.skin, copy)
 
     def factor(held: Floats, rows: Any) -> ShapeTransfer:
-        return tent_transfer(skin.vertices, vertices, copy.polygons, held, rows, links=skin.links)
+        return tent_transfer(skin.vertices, vertices, copy.polygons, held, seen @ rows, links=skin.links)
 
     return goal_transfer(source, target, skin_map, factor, _measures(copy))
+
+
+def _seen(source: Surface, target: Surface, copy: Resampled) -> Any:
+    """(k, k) sparse diagonal: 1 for feature points that have goals on the copy, 0 for those that it does not show.
+
+    Hidden points (inner lips, lower lids) would pull at what lies before them, which moves in another way.
+    """
+    from scipy.sparse import diags_array
+
+    hidden = source.point_matrix(anchor_ids(source, target)) @ (~copy.kept).astype(float)
+    return diags_array((np.asarray(hidden).ravel() == 0.0).astype(float))
 
 
 def build_published(source: PreparedFace, target: PreparedFace) -> BareTransfer:

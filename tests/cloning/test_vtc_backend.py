@@ -17,7 +17,7 @@ from cloning.source import source_motions
 from cloning.transfer import build_face_transfer
 from fat import AnimatableFace
 from fat.evaluate import Player
-from fba.arrays import Floats
+from fba.arrays import Bools, Floats
 from fba.scene import Role
 from formats import read_face
 from samples import sample
@@ -113,9 +113,16 @@ def test_free_shapes_are_carried_back_to_the_targets_own_vertices(
     assert np.linalg.norm(found[tip[0]] - transfer.apply(motions[:, :2])[tip[1]]) < 0.02 * yours.fapu.es0
 
 
-def test_a_face_onto_itself_gives_its_own_motion_in_its_own_topology(mine: PreparedFace, motions: Floats) -> None:
+@pytest.fixture(scope="module")
+def kept(mine: PreparedFace) -> Bools:
+    """(n,) what the source's own mesh image shows of it."""
+    return resample(mine.skin, mine.skin).kept
+
+
+def test_a_face_onto_itself_gives_its_own_motion_in_its_own_topology(
+    mine: PreparedFace, motions: Floats, kept: Bools
+) -> None:
     face, transfer = find_backend("vtc-image").build_published(mine, mine)
-    kept = resample(mine.skin, mine.skin).kept
     assert face.skin.vertex_count == kept.sum()
     error = np.abs(transfer.apply(motions) - motions[kept]).max()
     assert error < 1e-6 * np.linalg.norm(motions, axis=2).max()
@@ -149,3 +156,11 @@ def test_the_command_line_writes_the_papers_form_as_a_face_that_plays(mine: Prep
     rest, open_mouth = (Player(face).pose(values).world_shapes()[skin.name] for values in ({}, {3: 600}))
     assert np.array_equal(rest, face.scene.world_vertices(skin.name))
     assert np.linalg.norm(open_mouth - rest, axis=1).max() > 0.2 * face.fapu.es0
+
+
+def test_what_the_mesh_image_shows_of_a_face_gets_its_own_motion_back(
+    mine: PreparedFace, motions: Floats, kept: Bools
+) -> None:
+    found = find_backend("vtc-image").build(mine, mine, False).apply(motions)
+    error = np.abs(found - motions)[kept].max()
+    assert error < 1e-6 * np.linalg.norm(motions, axis=2).max()
