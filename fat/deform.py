@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -11,12 +12,15 @@ from numpy.typing import NDArray
 
 from fba.arrays import Bools, Floats, Ints
 
-TILE = 16
-"""Vertices in one tile. The columns of a tile are those that move any vertex in it: small tiles multiply fewer zeros,
-large ones multiply faster. Between 8 and 32 the speed of a face in full motion is the same within 10 %, at 512 half."""
+SHORTEST = 16
+"""Vertices in the shortest stretch. A stretch multiplies the columns that move any vertex in it: short ones multiply
+fewer zeros, long ones multiply faster. From 8 to 32 the speed of a cloned face in full motion is the same within 10 %."""
 
-WIDEST = 64
-"""Tiles in the longest stretch."""
+LONGEST = 1024
+"""Vertices in the longest stretch; a power of two times the shortest."""
+
+LONG_BATCH = 128
+"""Frames for which the tiles are chosen."""
 
 PRODUCT_COST = 200_000
 """What one more product costs by itself, in multiplications: about 5 microseconds."""
@@ -38,8 +42,8 @@ class Column:
 class Deformer(Generic[Number]):
     """Neutral vertices plus weighted columns, by one matrix product for each stretch of vertices.
 
-    Where many columns have weights, the stretches are tiles, whose rows are multiplied as they lie in memory. Where
-    few have, the stretches are longer, and the rows of the columns in use are copied first.
+    Tiles are the stretches that are best where all columns have weights; their rows are multiplied as they lie in
+    memory. Where few have, the stretches are longer, and the rows of the columns in use are copied first.
 
     Parameters
     ----------
@@ -57,18 +61,18 @@ class Deformer(Generic[Number]):
         self._starts: NDArray[np.intp] = np.searchsorted(first[self._order], distinct)
         # Column 0 is the neutral face, whose weight is 1. Row 0 holds zeros, for tiles that a column does not move.
         parts = [Column(np.arange(len(neutral), dtype=np.int32), neutral), *(columns[k] for k in distinct)]
-        tiles = -(-len(neutral) // (TILE * WIDEST)) * WIDEST
-        self._member: Bools = np.zeros((tiles, len(parts)), dtype=bool)
-        self._member[:, 0] = True
+        member = np.zeros((-(-len(neutral) // LONGEST) * (LONGEST // SHORTEST), len(parts)), dtype=bool)
+        member[:, 0] = True
         for k, part in enumerate(parts):
-            self._member[part.index // TILE, k] = True
+            member[part.index // SHORTEST, k] = True
+        self._tile, self._member = _stretches(SHORTEST, member, LONG_BATCH, 0)
         ids = np.cumsum(self._member, dtype=np.int32).reshape(self._member.shape)
         self._row: Ints = np.where(self._member, ids, 0).astype(np.int32)
         self._sizes = np.count_nonzero(self._member, axis=1)
-        self._rows: NDArray[Number] = np.zeros((1 + int(self._sizes.sum()), 3 * TILE), dtype=number)
+        self._rows: NDArray[Number] = np.zeros((1 + int(self._sizes.sum()), 3 * self._tile), dtype=number)
         flat = self._rows.reshape(-1)
         for k, part in enumerate(parts):
-            places = 3 * (TILE * self._row[part.index // TILE, k] + part.index % TILE)
+            places = 3 * (self._tile * self._row[part.index // self._tile, k] + part.index % self._tile)
             np.add.at(flat, (places[:, None] + np.arange(3)).ravel(), part.slopes.astype(number).ravel())
         self._columns = [np.flatnonzero(m).astype(np.int32) for m in self._member]
         self._tiles: list[NDArray[Number]] = np.split(self._rows[1:], np.cumsum(self._sizes)[:-1])
@@ -95,7 +99,8 @@ class Deformer(Generic[Number]):
         """Columns (k,) and their rows (k, numbers) of each stretch of vertices; the last stretches may be empty."""
         active: Ints = np.flatnonzero(factors.any(axis=1)).astype(np.int32)
         frames = factors.shape[1]
-        width, used = _stretches(self._member[:, active], frames)
+        length, used = _stretches(self._tile, self._member[:, active], frames, COPY_COST)
+        width = length // self._tile
         as_they_lie = np.zeros(len(used), dtype=bool)
         if width == 1:
             # No copy, but rows without weights are multiplied, too.
@@ -109,24 +114,33 @@ class Deformer(Generic[Number]):
                 yield columns, self._rows.take(row.T, axis=0).reshape(columns.size, -1)
 
 
-def _stretches(used: Bools, frames: int) -> tuple[int, Bools]:
-    """How many tiles are best multiplied as one, and which columns each such stretch uses.
+def _stretches(tile: int, used: Bools, frames: int, copy_cost: int) -> tuple[int, Bools]:
+    """Vertices in the stretches that cost least, and which columns each stretch uses.
 
+    Parameters
+    ----------
+    tile : vertices in a tile.
     used : (tiles, columns), which columns each tile uses.
+    copy_cost : what it costs to copy one number into a stretch that is longer than a tile.
     """
-    least, found, width = float(np.inf), (1, used), 1
+    least, length, best = float(np.inf), tile, (tile, used)
     while True:
-        numbers = 3 * TILE * width * np.count_nonzero(used)
-        cost = float(len(used) * PRODUCT_COST + numbers * (frames + (COPY_COST if width > 1 else 0)))
+        numbers = 3 * length * np.count_nonzero(used)
+        cost = float(len(used) * PRODUCT_COST + numbers * (frames + (copy_cost if length > tile else 0)))
         if cost < least:
-            least, found = cost, (width, used)
-        if width == WIDEST:
-            return found
-        used, width = used[0::2] | used[1::2], 2 * width
+            least, best = cost, (length, used)
+        if length == LONGEST:
+            return best
+        length, used = 2 * length, used[0::2] | used[1::2]
 
 
 def _first_equal(columns: Sequence[Column]) -> Ints:
     """For each column the number (K,) of the first that equals it: faces often give two FAPs the same motion."""
-    numbers: dict[tuple[bytes, bytes], int] = {}
-    keys = ((c.index.tobytes(), c.slopes.tobytes()) for c in columns)
-    return np.array([numbers.setdefault(key, k) for k, key in enumerate(keys)], dtype=np.int32)
+    numbers: dict[bytes, int] = {}
+    return np.array([numbers.setdefault(_digest(column), k) for k, column in enumerate(columns)], dtype=np.int32)
+
+
+def _digest(column: Column) -> bytes:
+    found = hashlib.blake2b(np.ascontiguousarray(column.index))
+    found.update(np.ascontiguousarray(column.slopes))
+    return found.digest()

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from fat import deform
-from fat.deform import TILE, WIDEST, Column, Deformer
+from fat.deform import LONGEST, SHORTEST, Column, Deformer
 
-COUNT = 2 * TILE * WIDEST + 3 * TILE + 5
+COUNT = 2 * LONGEST + 3 * SHORTEST + 5
 """Vertices that fill neither the last tile nor the last stretch."""
 
 
 def columns_of(rng: np.random.Generator) -> list[Column]:
     """Local and wide columns, one without vertices, one with a vertex twice, and one that comes twice."""
     made = []
-    for size in (1, 5, TILE, 100, 700, COUNT, 0):
+    for size in (1, 5, SHORTEST, 100, 700, COUNT, 0):
         start = int(rng.integers(0, COUNT - size + 1))
         index = rng.permutation(np.arange(start, start + size, dtype=np.int32))
         made.append(Column(index, rng.normal(size=(size, 3))))
@@ -72,11 +72,11 @@ def test_nothing_to_move() -> None:
 
 
 def test_stretches_are_long_where_few_columns_are_used() -> None:
-    tiles = 2 * WIDEST
-    width, used = deform._stretches(np.ones((tiles, 1), dtype=bool), 64)
-    assert (width, used.shape) == (WIDEST, (2, 1))
+    tiles = 2 * LONGEST // SHORTEST
+    length, used = deform._stretches(SHORTEST, np.ones((tiles, 1), dtype=bool), 64, 20)
+    assert (length, used.shape) == (LONGEST, (2, 1))
     # Sixty columns of their own in every tile: together, they would multiply more zeros than a product costs.
     apart = np.kron(np.eye(tiles, dtype=bool), np.ones((1, 60), dtype=bool))
-    width, used = deform._stretches(apart, 512)
-    assert width == 1
+    length, used = deform._stretches(SHORTEST, apart, 512, 20)
+    assert length == SHORTEST
     assert used is apart
