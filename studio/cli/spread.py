@@ -15,12 +15,18 @@ class Spread(TyperCommand):
         many = {name for p in self.params if isinstance(p, TyperOption) and p.multiple for name in p.opts}
         spread: list[str] = []
         current: str | None = None
+        alone = ""  # An option that no word has followed yet.
         for word in args:
             if word.startswith("-"):
-                current = word if word in many else None
-                spread += [] if current else [word]
-            elif current is None:
-                spread.append(word)
+                if alone:
+                    break
+                name, joined, _ = word.partition("=")  # --targets=a.obj b.obj
+                current = name if name in many else None
+                alone = word if current and not joined else ""
+                spread += [] if alone else [word]
             else:
-                spread += [current, word]
+                spread += [word] if current is None else [current, word]
+                alone = ""
+        if alone:
+            ctx.fail(f"Option '{alone}' requires an argument.")
         return super().parse_args(ctx, spread)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pytest
+import typer
 from PIL import Image
 from typer.testing import CliRunner, Result
 
@@ -19,6 +20,7 @@ from formats import read_face
 from samples import sample
 from studio.cli.app import app
 from studio.cli.outcome import Outcome
+from studio.cli.spread import Spread
 from studio.motions import COMBINATIONS, parse_motions
 from studio.render import Figure, make_renderer
 
@@ -91,6 +93,35 @@ def test_the_picture_holds_a_grid_for_each_motion(grid: tuple[dict[str, Any], Pa
         own = figure.draw(pose.world_shapes(), (60, 72), figure.camera, make_renderer())
         windows = np.lib.stride_tricks.sliding_window_view(image[:, -74:-14], own.shape, axis=(0, 1, 2))[:, 0, 0]  # type: ignore[call-overload]
         assert (windows == own).all(axis=(1, 2, 3)).sum() == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "targets"),
+    [
+        (("a", "--targets", "b", "c", "-o", "x"), ["b", "c"]),
+        (("a", "--targets=b", "c", "-o", "x"), ["b", "c"]),
+        (("--targets", "b", "-o", "x", "a"), ["b"]),
+        (("a", "-o", "x", "--targets"), None),
+        (("a", "--targets", "-o", "x"), None),
+    ],
+)
+def test_as_many_targets_as_follow(words: tuple[str, ...], targets: list[str] | None) -> None:
+    app = typer.Typer()
+
+    @app.command(cls=Spread)
+    def show(
+        sources: list[str],
+        targets: Annotated[list[str] | None, typer.Option()] = None,
+        output: Annotated[str, typer.Option("-o")] = "",
+    ) -> None:
+        typer.echo(json.dumps([sources, targets, output]))
+
+    result = CliRunner().invoke(app, words)
+    if targets is None:
+        assert result.exit_code == Outcome.USAGE
+        assert "--targets" in result.output
+    else:
+        assert json.loads(result.output) == [["a"], targets, "x"]
 
 
 def test_a_pair_that_cannot_be_cloned_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
