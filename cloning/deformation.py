@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from cloning.shape_solver import POINT_WEIGHT, ShapeTransfer, shape_transfer, welded
+from cloning.vectors import ROWS, cross, edges, length
 from fba.arrays import Bools, Floats, Ints
 
 THINNEST = 1e-7
@@ -114,17 +115,23 @@ def _assembled(weights: Floats, to: Floats, of: Floats, triangles: Ints, n: int)
 
 def _turned(source: Floats, triangles: Ints, offsets: list[Floats]) -> list[Floats]:
     """How the fourth vectors of the source's triangles change: three (t, K) arrays, x, y and z."""
-    a, b, c = triangles.T
+    moving = (offsets[0] != 0.0) | (offsets[1] != 0.0) | (offsets[2] != 0.0)
+    some = np.flatnonzero(moving.any(axis=1)[triangles].any(axis=1))
     still = [source[:, axis, None] for axis in range(3)]
-    rest = _fourth([p[b] - p[a] for p in still], [p[c] - p[a] for p in still])
     posed = [p + d for p, d in zip(still, offsets, strict=True)]
-    moved = _fourth([p[b] - p[a] for p in posed], [p[c] - p[a] for p in posed])
-    return [after - before for after, before in zip(moved, rest, strict=True)]
+    changes = [np.zeros((len(triangles), d.shape[1])) for d in offsets]
+    corners: Any = np.ascontiguousarray(triangles[some].T, np.intp)
+    rest = _fourth(still, corners)
+    for start in range(0, len(some), ROWS):
+        rows = slice(start, start + ROWS)
+        for change, after, before in zip(changes, _fourth(posed, corners[:, rows]), rest, strict=True):
+            change[some[rows]] = after - before[rows]
+    return changes
 
 
-def _fourth(e: list[Floats], f: list[Floats]) -> list[Floats]:
-    """Fourth vectors over two edges each, x, y and z apart: cross product over the root of its length."""
-    cross = [e[(k + 1) % 3] * f[(k + 2) % 3] - e[(k + 2) % 3] * f[(k + 1) % 3] for k in range(3)]
-    root = np.sqrt(np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2))
-    root = np.maximum(root, 1e-150)
-    return [part / root for part in cross]
+def _fourth(places: list[Floats], corners: Ints) -> list[Floats]:
+    """Fourth vectors, x, y and z apart: cross product of two edges over the root of its length."""
+    a, b, c = corners
+    normal = cross(edges(places, a, b), edges(places, a, c))
+    root = np.maximum(np.sqrt(length(normal)), 1e-150)
+    return [part / root for part in normal]

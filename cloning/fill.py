@@ -37,7 +37,9 @@ class HarmonicFill:
         reached = _reached(full, unknown)
         self.unreached: Bools = unknown & ~reached
         self.rows = np.flatnonzero(unknown & reached)
-        self.known = np.flatnonzero(~unknown)
+        known = np.flatnonzero(~unknown)
+        near = np.unique(full[self.rows][:, known].indices)
+        self.known = known[near]
         self._pull: Any = full[self.rows][:, self.known]
         self._solve: Any = None
         if len(self.rows):

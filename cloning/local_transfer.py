@@ -19,11 +19,12 @@ from cloning.fill import HarmonicFill
 from cloning.normalize import blend, ratios
 from cloning.prepare import PreparedFace
 from cloning.refine import Refinement
-from cloning.shape_solver import POINT_WEIGHT, ShapeTransfer
+from cloning.shape_solver import POINT_WEIGHT, ShapeTransfer, column_blocks
 from cloning.skin import SkinMap, refined
 from cloning.surface import Surface
 from cloning.template.correspondence import Correspondence, correspond
 from cloning.template.fitting import fit_template
+from cloning.vectors import ROWS, length
 from fba.arrays import Bools, Floats
 
 RESTING = 1.0
@@ -137,13 +138,20 @@ class GoalTransfer:
         if self.solver is None:
             return self.anchored(_reach(motions)).apply(motions)
         source, target = self.source, self.target
-        wishes = motions * self.scale[:, None]
         at_points = (source.skin.point_matrix(self.ids) @ _flat(motions)).reshape(len(self.ids), -1, 3)
         goals = at_points * ratios(source.fapu, target.fapu, self.ids)[:, None] / target.fapu.es0
-        deformed = self.solver.apply(motions / source.fapu.es0, wishes, goals)
+        deformed, wished = np.empty(motions.shape), np.empty(motions.shape[:2])
+        for some in column_blocks(motions.shape[1]):
+            block = np.ascontiguousarray(motions[:, some])
+            wishes = block * self.scale[:, None]
+            wished[:, some] = _lengths(wishes)
+            deformed[:, some] = self.solver.apply(block / source.fapu.es0, wishes, goals[:, some])
         carried = self.carry(_flat(deformed)).reshape(-1, *motions.shape[1:])
-        most = MOST * self.carry(_lengths(wishes))
-        carried *= (target.fapu.es0 * np.minimum(most / np.maximum(_lengths(carried), 1e-300), 1.0))[:, :, None]
+        most = MOST * self.carry(wished)
+        for start in range(0, len(carried), ROWS):
+            rows = slice(start, start + ROWS)
+            share = np.minimum(most[rows] / np.maximum(_lengths(carried[rows]), 1e-300), 1.0)
+            carried[rows] *= (target.fapu.es0 * share)[:, :, None]
         return carried
 
     def carry(self, values: Floats) -> Floats:
@@ -213,9 +221,7 @@ def _reach(motions: Floats) -> Floats:
 
 def _lengths(offsets: Floats) -> Floats:
     """(n, K) lengths of (n, K, 3) offsets."""
-    squared = np.einsum("nkd,nkd->nk", offsets, offsets)
-    lengths: Floats = np.sqrt(squared)
-    return lengths
+    return length([offsets[:, :, axis] for axis in range(3)])
 
 
 def _flat(offsets: Floats) -> Floats:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from cloning.factors import factored
 from fba.arrays import Floats, Ints
 
 COLUMNS = 16
-"""Right-hand sides solved in one go: SuperLU is fastest with about this many, in Fortran order."""
+"""At most so many motions are solved in one go: SuperLU is fastest with a dozen right sides, in Fortran order."""
 
 POINT_WEIGHT = 10.0
 """How much a feature point's goal counts against the local changes of one triangle or tent."""
@@ -62,17 +63,16 @@ class ShapeTransfer:
         (n, K, 3) offsets of the target's vertices.
         """
         out = np.empty(motions.shape)
-        for start in range(0, motions.shape[1], COLUMNS):
-            some = slice(start, start + COLUMNS)
-            offsets = [np.ascontiguousarray(motions[:, some, axis]) for axis in range(3)]
-            turned = self.turned(offsets)
-            for axis in range(3):
-                right = self.linear @ offsets[axis] + self.turning @ turned[axis]
-                if wishes is not None:
-                    right += self.holding @ np.ascontiguousarray(wishes[:, some, axis])
-                if goals is not None:
-                    right += self.pulling @ np.ascontiguousarray(goals[:, some, axis])
-                out[:, some, axis] = self.weld @ self._solved(right)
+        for some in column_blocks(motions.shape[1]):
+            offsets = _apart(motions[:, some])
+            rights = [
+                self.linear @ d + self.turning @ turn for d, turn in zip(offsets, self.turned(offsets), strict=True)
+            ]
+            for matrix, wanted in ((self.holding, wishes), (self.pulling, goals)):
+                if wanted is not None:
+                    for right, part in zip(rights, _apart(wanted[:, some]), strict=True):
+                        right += matrix @ part
+            out[:, some] = np.stack([self.weld @ self._solved(right) for right in rights], axis=2)
         return out
 
     def _solved(self, right: Floats) -> Floats:
@@ -82,6 +82,18 @@ class ShapeTransfer:
         if len(moving):
             out[:, moving] = self.solver.solve(np.asfortranarray(right[:, moving]))
         return out
+
+
+def column_blocks(count: int) -> list[slice]:
+    """Some motions at a time: as few blocks as there can be, of even sizes."""
+    ends = np.linspace(0, count, -(-count // COLUMNS) + 1).astype(int)
+    return [slice(start, end) for start, end in pairwise(ends)]
+
+
+def _apart(offsets: Floats) -> list[Floats]:
+    """x, y and z of (n, K, 3): three (n, K) arrays."""
+    # A compact copy first: far apart in memory, single numbers cost ten times as much.
+    return list(np.ascontiguousarray(np.ascontiguousarray(offsets).transpose(2, 0, 1)))
 
 
 def shape_transfer(

@@ -22,56 +22,13 @@ from typing import Any
 
 import numpy as np
 
+from cloning.rings import Rings, one_rings
 from cloning.shape_solver import POINT_WEIGHT, ShapeTransfer, shape_transfer, welded
+from cloning.tips import Tips, tips_of
 from fba.arrays import Bools, Floats, Ints
 
 THINNEST = 1e-6
 """Tents whose smallest extent (squared) is below this share of their size (squared) span no space; left out."""
-
-
-@dataclass(frozen=True, eq=False)
-class Rings:
-    """The one-rings of a polygon mesh.
-
-    Attributes
-    ----------
-    owners, others : (r,) every edge from both of its ends: a vertex, and a neighbour of it.
-    corners : (c, 3) at every corner of a polygon: the vertex before, the vertex, the vertex after.
-    arity : (c,) number of corners of the polygon that each corner belongs to.
-    count : number of vertices.
-    """
-
-    owners: Ints
-    others: Ints
-    corners: Ints
-    arity: Ints
-    count: int
-
-    @property
-    def valence(self) -> Ints:
-        """(n,) number of neighbours."""
-        return np.bincount(self.owners, minlength=self.count).astype(np.int32)
-
-
-def one_rings(indices: Ints, offsets: Ints, count: int) -> Rings:
-    """One-rings of polygons of any arity.
-
-    Parameters
-    ----------
-    indices, offsets : polygons as in PolyMesh.
-    count : number of vertices.
-    """
-    arity = np.diff(offsets)
-    after, before = np.arange(indices.size) + 1, np.arange(indices.size) - 1
-    filled = arity > 0
-    after[offsets[1:][filled] - 1] = offsets[:-1][filled]
-    before[offsets[:-1][filled]] = offsets[1:][filled] - 1
-    corners = np.stack([indices[before], indices, indices[after]], axis=1)
-    pairs = np.concatenate([corners[:, [1, 2]], corners[:, [2, 1]]])
-    keys = np.unique(pairs[:, 0].astype(np.int64) * count + pairs[:, 1])
-    owners, others = keys // count, keys % count
-    apart = owners != others
-    return Rings(owners[apart], others[apart], corners, np.repeat(arity, arity), count)
 
 
 def tent_transfer(
@@ -103,19 +60,20 @@ def tent_transfer(
     mean = (weld @ diags_array(1.0 / np.maximum(weld.sum(axis=0), 1.0))).T.tocsr()
     group = weld.indices
     rings = one_rings(group[polygons[0]], polygons[1], weld.shape[1])
-    mine, yours = _tents(rings, mean @ source), _tents(rings, mean @ target)
+    tips = tips_of(rings)
+    mine, yours = _tents(rings, tips, mean @ source), _tents(rings, tips, mean @ target)
     stands = mine.stands & yours.stands
     area = _areas(rings, mean @ target)
     weights = np.where(stands, 1.0 if uniform else area / area[stands].mean(), 0.0)
     plane = _plane(yours.lean)
     goal, given = _rows(rings, yours, plane, stands), _rows(rings, mine, plane, stands)
-    tips = _ring_sum(plane @ np.where(stands[:, None], mine.lean, 0.0)[:, :, None])
+    turning = _ring_sum(plane @ np.where(stands[:, None], mine.lean, 0.0)[:, :, None])
     pull = goal.T @ diags_array(np.repeat(weights, 2))
     return shape_transfer(
         pull @ goal,
         pull @ given @ mean,
-        pull @ tips,
-        partial(_turned, rings, mean @ source, mean, _sums(rings)),
+        pull @ turning,
+        partial(_turned, tips, mean @ source, mean),
         weld,
         float(np.linalg.norm(yours.edges, axis=1).mean()) ** -2,
         held,
@@ -142,9 +100,9 @@ class _Tents:
     stands: Bools
 
 
-def _tents(rings: Rings, vertices: Floats) -> _Tents:
+def _tents(rings: Rings, tips: Tips, vertices: Floats) -> _Tents:
     edges = vertices[rings.others] - vertices[rings.owners]
-    tip = np.stack([t[:, 0] for t in _tips(rings, [vertices[:, [k]] for k in range(3)], _sums(rings))], axis=1)
+    tip = np.concatenate(tips.of([vertices[:, [k]] for k in range(3)]), axis=1)
     gram = tip[:, :, None] * tip[:, None, :]
     for a in range(3):
         for b in range(3):
@@ -187,39 +145,6 @@ def _ring_sum(values: Floats) -> Any:
     return csr_array((values.ravel(), (np.arange(2 * n), np.repeat(np.arange(n), 2))), shape=(2 * n, n))
 
 
-def _sums(rings: Rings) -> Any:
-    """(n, c) sparse: sums over the corners at each vertex."""
-    from scipy.sparse import csr_array
-
-    c = len(rings.corners)
-    return csr_array((np.ones(c), (rings.corners[:, 1], np.arange(c))), shape=(rings.count, c))
-
-
-def _tips(rings: Rings, places: list[Floats], sums: Any) -> list[Floats]:
-    """Tip vectors, x, y and z of (n, K): along the normal of the corners, as long as the mean edge of the ring."""
-    before, middle, after = rings.corners.T
-    e, f = ([p[end] - p[middle] for p in places] for end in (after, before))
-    normal = [sums @ (e[(k + 1) % 3] * f[(k + 2) % 3] - e[(k + 2) % 3] * f[(k + 1) % 3]) for k in range(3)]
-    size = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-    factor = _mean_edge(rings, places) / np.maximum(size, 1e-150)
-    return [part * factor for part in normal]
-
-
-def _mean_edge(rings: Rings, places: list[Floats]) -> Floats:
-    """(n, K) mean length of the edges at each vertex."""
-    from scipy.sparse import csr_array
-
-    once = rings.owners < rings.others
-    a, b = rings.owners[once], rings.others[once]
-    x, y, z = (p[b] - p[a] for p in places)
-    length = np.sqrt(x**2 + y**2 + z**2)
-    share = 1.0 / np.maximum(rings.valence, 1)
-    edge = np.arange(len(a))
-    where = (np.concatenate([a, b]), np.concatenate([edge, edge]))
-    mean: Floats = csr_array((np.concatenate([share[a], share[b]]), where), shape=(rings.count, len(a))) @ length
-    return mean
-
-
 def _areas(rings: Rings, vertices: Floats) -> Floats:
     """(n,) each polygon's area, divided evenly among its corners; by the triangles at the corners."""
     before, middle, after = (vertices[rings.corners[:, k]] for k in range(3))
@@ -229,9 +154,10 @@ def _areas(rings: Rings, vertices: Floats) -> Floats:
     return np.asarray(np.bincount(rings.corners[:, 1], share, rings.count), np.float64)
 
 
-def _turned(rings: Rings, source: Floats, mean: Any, sums: Any, offsets: list[Floats]) -> list[Floats]:
+def _turned(tips: Tips, source: Floats, mean: Any, offsets: list[Floats]) -> list[Floats]:
     """How the source's tips change: three (n, K) arrays, x, y and z."""
     rest = [source[:, [axis]] for axis in range(3)]
-    posed = [p + mean @ d for p, d in zip(rest, offsets, strict=True)]
-    tips = zip(_tips(rings, posed, sums), _tips(rings, rest, sums), strict=True)
-    return [after - before for after, before in tips]
+    changes = tips.of([p + mean @ d for p, d in zip(rest, offsets, strict=True)])
+    for change, before in zip(changes, tips.of(rest), strict=True):
+        change -= before
+    return changes

@@ -9,9 +9,10 @@ from sheets import cells, grid, halves, held_border, offsets
 
 from cloning.deformation import deformation_transfer
 from cloning.prepare import prepare
+from cloning.rings import one_rings
 from cloning.shape_solver import COLUMNS
 from cloning.source import source_motions
-from cloning.tents import one_rings, tent_transfer
+from cloning.tents import tent_transfer
 from fat import AnimatableFace
 from fba.arrays import Floats, Ints
 from fba.scene import rotation_matrix
