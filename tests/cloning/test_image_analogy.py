@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from photo_faces import EYES, UNIT, picture, pixels, points, wrinkle
 
-from cloning.image import METHODS, Analogy, AnalogyResult, Method, Picture
+from cloning.image import METHODS, Analogy, AnalogyResult, Method, Picture, parts
 from cloning.image import solve as solving
 from cloning.image.color import to_yuv
 from cloning.image.mask import BORDER, REACH, contour, depth_within
@@ -63,6 +63,15 @@ def test_large_pictures_come_out_as_small_ones(monkeypatch: pytest.MonkeyPatch) 
     iterated = transfer(source, expression, target)
     assert direct.steps == 0 < iterated.steps
     assert np.abs(direct.luminance - iterated.luminance).max() < 0.2
+
+
+def test_pictures_come_out_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    source, target, expression = picture(pixels()), picture(pixels(0.9, seed=5)), picture(wrinkle(pixels()), OPEN)
+    whole = transfer(source, expression, target)
+    monkeypatch.setattr(parts, "LONG", 1000)
+    found = transfer(source, expression, target)
+    assert (found.changed == whole.changed).all()
+    assert found.luminance == pytest.approx(whole.luminance, abs=1e-3)
 
 
 def test_one_preparation_serves_many_expressions() -> None:
