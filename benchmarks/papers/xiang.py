@@ -33,6 +33,17 @@ from studio.sheet import INK, PAPER, PosePick, Sheet, UInt8
 KNOWN = ("tri_head", "quad_head", "closed_head", "phenotype_a", "phenotype_b", "generic_neutral_mesh")
 """Faces whose landmarks are known."""
 DRAWN = ("tri_head", "quad_head", "closed_head")
+PLACES = {
+    ("2.1",): "chin",
+    ("2.4", "2.5"): "lips",
+    ("2.10",): "chin",
+    ("3.7", "3.8", "3.11", "3.12"): "corners of the eyes",
+    ("4.1", "4.2", "4.5", "4.6"): "brows",
+    ("5.3", "5.4"): "cheeks",
+    ("8.1", "8.2"): "lips",
+    ("9.1", "9.2", "9.3", "9.15"): "nose",
+}
+"""Where the landmarks lie, as they follow each other."""
 BAR = 0.08
 """The paper's "most below 8 %" of an eye width."""
 CELL = 150
@@ -101,7 +112,7 @@ def _dots(scene: FaceScene, true: FeaturePoints, detected: Mapping[str, FeatureP
 
 def bars(found: list[Found]) -> Image.Image:
     """Mean error of each landmark over the faces, detected once and again after the source was deformed."""
-    width, height, left, low = 900, 340, 60, 300
+    width, height, left, low = 900, 360, 60, 300
     image = Image.new("RGB", (width, height), PAPER)
     draw, font = ImageDraw.Draw(image), ImageFont.load_default(12)
     means = {key: [np.mean([way[key] for way in ways if key in way]) for ways in _ways(found)] for key in LANDMARKS}
@@ -110,16 +121,20 @@ def bars(found: list[Found]) -> Image.Image:
     for level in np.arange(0.0, top + 1e-9, 0.04):
         y = low - level * scale
         draw.line((left, y, width - 20, y), fill=(170, 60, 50) if abs(level - BAR) < 1e-9 else (225, 225, 228))
-        draw.text((left - 8, y), f"{level:.2f}", INK, font, anchor="rm")
+        draw.text((left - 8, y), f"{100 * level:.0f} %", INK, font, anchor="rm")
     step = (width - 20 - left) / len(LANDMARKS)
     for k, key in enumerate(LANDMARKS):
         for j, (value, color) in enumerate(zip(means[key], (ONCE, AGAIN), strict=True)):
             x = left + (k + 0.15 + 0.35 * j) * step
             draw.rectangle((x, low - value * scale, x + 0.33 * step, low), fill=color)
         draw.text((left + (k + 0.5) * step, low + 6), key, INK, font, anchor="ma")
-    for j, (text, color) in enumerate((("detected once", ONCE), ("deformed, detected again", AGAIN))):
-        draw.rectangle((left + 10 + 200 * j, 10, left + 22 + 200 * j, 22), fill=color)
-        draw.text((left + 28 + 200 * j, 16), text, INK, font, anchor="lm")
+    for places, text in PLACES.items():
+        middle = left + step * (float(np.mean([LANDMARKS.index(key) for key in places])) + 0.5)
+        draw.text((middle, low + 24), text, INK, font, anchor="ma")
+    draw.text((left, 16), f"error / eye width, mean of {len(found)} faces:", INK, font, anchor="lm")
+    for x, text, color in ((300, "detected once", ONCE), (420, "deformed, detected again", AGAIN)):
+        draw.rectangle((x, 10, x + 12, 22), fill=color)
+        draw.text((x + 18, 16), text, INK, font, anchor="lm")
     return image
 
 
