@@ -19,7 +19,7 @@ from fba.faps import EXPRESSION_FAP
 from fba.feature_points import FeaturePoint, FeaturePoints
 from fba.scene import Role
 from formats import read_face
-from studio.checked_skin import CheckedSkin, check_skin
+from studio.checked_skin import CheckedSkin, check_skin, common_points
 from studio.judging import measure
 
 LENGTHS = (0.005, 0.015, 0.05, 0.15)
@@ -58,7 +58,9 @@ def some_motions(keys: Collection[tuple[int, int]]) -> AnimatableFace:
 
 def beside_source(face: AnimatableFace, skin: CheckedSkin, source: AnimatableFace) -> Bench:
     """A clone beside the face it was cloned from."""
-    return Bench(face, skin, source, measure(source, 0.0, conformance(source), check_skin(source)))
+    other = check_skin(source)
+    points = common_points(skin, other)
+    return Bench(face, skin, source, measure(source, 0.0, conformance(source), other, points), points)
 
 
 def spoilt(b: Bench, fap_id: int | None, change: Change, select: int = 1) -> AnimatableFace:

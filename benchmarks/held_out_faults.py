@@ -228,7 +228,7 @@ DOSES: tuple[Dose, ...] = (
         "FAP 6 ends too near its point",
         SHARE,
         SHARES,
-        "stretch99",
+        "stretch",
         ("held-out", "lip-gap", "lip-depth", *AMOUNT, *SHAPE),
         steeper,
     ),

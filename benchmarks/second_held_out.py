@@ -246,7 +246,7 @@ DOSES: tuple[Dose, ...] = (
         "FAP 17 ends too near its point",
         SHARE,
         SHARES,
-        "stretch99",
+        "stretch",
         ("held-out", "lip-gap", "lip-depth", *AMOUNT, *SHAPE),
         ends_too_near,
     ),

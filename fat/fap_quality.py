@@ -63,6 +63,7 @@ class FapQuality:
     penetration : percent of the skin vertices on the front of the eyeballs that get into them.
     asymmetry : relative L2 difference from the mirror image of the other side's FAP.
     through : vertices of the lining of mouth, cheeks and nose that come before the skin.
+    fold : size in eye separations of the largest patch that is seen at rest and turns over, see `fat.folds`.
     """
 
     fap_id: int
@@ -80,6 +81,7 @@ class FapQuality:
     penetration: float | None
     asymmetry: float | None
     through: int | None = None
+    fold: float | None = None
 
     @property
     def high_level(self) -> bool:

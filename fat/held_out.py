@@ -11,6 +11,7 @@ import numpy as np
 
 from fba.arrays import Floats
 from fba.faps import faps
+from fba.feature_points import feature_point_definitions
 
 NAMED = frozenset(f.feature_points[0] for f in faps() if f.feature_points)
 """The points that a FAP names."""
@@ -80,4 +81,32 @@ def misplaced(source: Mapping[str, Floats], target: Mapping[str, Floats]) -> dic
     return {key: float(value) / width for key, value in zip(common, off, strict=True)}
 
 
-__all__ = ["NAMED", "held_out_error", "misplaced"]
+def uneven(places: Mapping[str, Floats]) -> dict[str, float]:
+    """How far each feature point lies from the mirror image of its counterpart, in eye widths.
+
+    Parameters
+    ----------
+    places : feature point -> neutral position (3,).
+
+    Returns
+    -------
+    Point -> distance, the same for both of a pair. The mirror is the plane that suits all pairs best, so that a face
+    that is turned or stands aside is no worse. Empty if fewer than FEWEST points have a counterpart, or no eye
+    corners are given.
+    """
+    other = {k: feature_point_definitions()[k].counterpart for k in sorted(places)}
+    keys = [k for k, mate in other.items() if mate in places]
+    widths = [float(np.linalg.norm(places[a] - places[b])) for a, b in EYES if a in places and b in places]
+    if len(keys) < FEWEST or not widths:
+        return {}
+    here, there = (np.array([places[k or ""] for k in some]) for some in (keys, [other[k] for k in keys]))
+    # The plane's normal is what most ways from a point to its counterpart have in common.
+    ways = there - here
+    normal = np.linalg.eigh(ways.T @ ways)[1][:, -1]
+    middle = np.median((here + there) @ normal) / 2.0
+    mirrored = there - 2.0 * ((there @ normal) - middle)[:, None] * normal
+    off = np.linalg.norm(here - mirrored, axis=1) / float(np.mean(widths))
+    return dict(zip(keys, off.tolist(), strict=True))
+
+
+__all__ = ["NAMED", "held_out_error", "misplaced", "uneven"]

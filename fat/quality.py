@@ -232,8 +232,13 @@ def edge_stretch(vertices: Floats, edges: Ints, offsets: Floats) -> float:
     return float(np.percentile(np.abs(np.log(ratio)), 99))
 
 
-def roughness(edges: Ints, offsets: Floats) -> float:
-    """``||D - mean of D over the neighbours|| / ||D||``: high for noise, low for a smooth motion."""
+def roughness(edges: Ints, offsets: Floats, where: Bools | None = None) -> float:
+    """``||D - mean of D over the neighbours|| / ||D||``: high for noise, low for a smooth motion.
+
+    Parameters
+    ----------
+    where : (n,) the vertices that are read; None: all.
+    """
     count = len(offsets)
     ring = np.zeros_like(offsets)
     degree = np.bincount(edges.ravel(), minlength=count)
@@ -243,8 +248,9 @@ def roughness(edges: Ints, offsets: Floats) -> float:
     lone = degree == 0
     ring[~lone] /= degree[~lone, None]
     ring[lone] = offsets[lone]
-    norm = float(np.linalg.norm(offsets))
-    return float(np.linalg.norm(offsets - ring)) / norm if norm else 0.0
+    used = slice(None) if where is None else where
+    norm = float(np.linalg.norm(offsets[used]))
+    return float(np.linalg.norm(offsets[used] - ring[used])) / norm if norm else 0.0
 
 
 __all__ = [

@@ -14,8 +14,8 @@ from fba.arrays import Floats, Ints
 SLACK = 0.02
 """Eye separations (1.2 mm) added to the length of an edge: a jump over less than that is a jump, however short."""
 
-OUTLIERS = 99.9
-"""Percentile of the edges that is read; a face has ten thousands of edges, so some ten may be worse."""
+SHORT = 0.005
+"""Eye separations (.3 mm) added to an edge's length before and after: how much a tiny edge stretches shows nowhere."""
 
 
 def jumps(vertices: Floats, edges: Ints, offsets: Floats) -> Floats:
@@ -57,28 +57,56 @@ def hinges(triangles: Ints) -> Ints:
     return found
 
 
-def bending(vertices: Floats, bends: Ints, offsets: Floats) -> Floats:
-    """By how many degrees a motion changes the angle between the two triangles of each hinge (h,), 0 to 180.
+def angles(vertices: Floats, bends: Ints) -> Floats:
+    """By how many radians the second triangle of each hinge is turned out of the first one's plane, (h,)."""
+    a, b, c, d = (vertices[bends[:, k]] for k in range(4))
+    along = b - a
+    one, two = _cross(along, c - a), _cross(d - a, along)
+    length = np.maximum(np.sqrt(np.einsum("ij,ij->i", along, along)), 1e-300)
+    sine = np.einsum("ij,ij->i", _cross(one, two), along) / length
+    found: Floats = np.arctan2(sine, np.einsum("ij,ij->i", one, two))
+    return found
+
+
+def bending(before: Floats, after: Floats) -> Floats:
+    """By how many degrees the angle between the two triangles of each hinge changes (h,), 0 to 180.
 
     Parameters
     ----------
-    vertices, offsets : (n, 3). bends : (h, 4), see `hinges`. Triangles of no area do not bend.
+    before, after : (h,) see `angles`. Triangles of no area do not bend.
     """
-    change = np.abs(_angles(vertices + offsets, bends) - _angles(vertices, bends))
-    change = np.minimum(change, 2.0 * np.pi - change)
-    degrees: Floats = np.degrees(change)
+    change = np.abs(after - before)
+    degrees: Floats = np.degrees(np.minimum(change, 2.0 * np.pi - change))
     return degrees
 
 
-def _angles(vertices: Floats, bends: Ints) -> Floats:
-    """Angle (h,) in radians by which the second triangle is turned out of the first one's plane."""
+def reach(vertices: Floats, bends: Ints) -> Floats:
+    """How far the skin goes on either side of each hinge (h,): a third of both triangles' height.
+
+    A bend by one angle is as sharp as this is short: the fold of a paper, or a ball's facets.
+    """
     a, b, c, d = (vertices[bends[:, k]] for k in range(4))
     along = b - a
-    one, two = np.cross(along, c - a), np.cross(d - a, along)
-    length = np.maximum(np.linalg.norm(along, axis=1), 1e-300)
-    sine = np.einsum("ij,ij->i", np.cross(one, two), along) / length
-    angles: Floats = np.arctan2(sine, np.einsum("ij,ij->i", one, two))
-    return angles
+    area = np.linalg.norm(_cross(along, c - a), axis=1) + np.linalg.norm(_cross(d - a, along), axis=1)
+    width: Floats = area / 3.0 / np.maximum(np.linalg.norm(along, axis=1), 1e-300)
+    return width
 
 
-__all__ = ["OUTLIERS", "SLACK", "bending", "hinges", "jumps"]
+def stretching(before: Floats, after: Floats) -> Floats:
+    """How much longer or shorter edges get (e,): the size of log(after / before), SHORT added to both lengths.
+
+    >>> float(stretching(np.array([0.195]), np.array([0.395])).round(3))
+    0.693
+    """
+    ratio: Floats = np.abs(np.log((after + SHORT) / (before + SHORT)))
+    return ratio
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Like `numpy.cross`, several times faster."""
+    x, y, z = a.T
+    u, v, w = b.T
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
+
+
+__all__ = ["SHORT", "SLACK", "angles", "bending", "hinges", "jumps", "reach", "stretching"]

@@ -20,6 +20,8 @@ from fba.arrays import Bools, Floats, Ints
 from fba.errors import LandmarkError
 from fba.scene import Role
 
+LIPS = 2
+"""Greatest label of a lip, see `cloning.labels`; lids have greater ones."""
 EAR = "10.3"
 BEHIND = 0.1
 """Eye separations behind the ear's front from which a head is its back, which no FAP but an ear's moves."""
@@ -33,7 +35,7 @@ class CheckedSkin:
     ----------
     seen : (n,) what can be seen on the neutral face.
     labels : (n,) lips and lids, see `cloning.labels`.
-    lining : (m,) vertices that line the inside, see `cloning.lining`.
+    lining : (m,) vertices that line mouth, cheeks and nose, see `cloning.lining`.
     eyeballs : the eyeballs that are there, each with the names of its shapes.
     """
 
@@ -88,8 +90,17 @@ def check_skin(face: AnimatableFace) -> CheckedSkin | None:
     seen = np.concatenate([shown[name] > 0.0 for name in names])
     labels = label(surface)
     prepared = PreparedFace(face.scene, face.feature_points, face.fapu, surface, labels, ())
+    eyeballs = _eyeballs(face, prepared)
     lined = lining(surface, seen, labels.values)
-    return CheckedSkin(surface, seen, labels.values, lined, _eyeballs(face, prepared))
+    # Around the eyes lids slide over the skin of the sockets, and what shows there are the eyeballs.
+    sockets = [ball.vertices for ball, _ in eyeballs] + [np.flatnonzero(labels.values > LIPS)]
+    lined = np.setdiff1d(lined, np.concatenate(sockets)).astype(np.int32)
+    return CheckedSkin(surface, seen, labels.values, lined, eyeballs)
+
+
+def common_points(one: CheckedSkin | None, other: CheckedSkin | None) -> set[str]:
+    """The feature points that two skins have."""
+    return set() if one is None or other is None else set(one.surface.points) & set(other.surface.points)
 
 
 def _eyeballs(face: AnimatableFace, prepared: PreparedFace) -> list[tuple[Ball, list[str]]]:

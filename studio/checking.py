@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,9 +16,10 @@ from fat.fap_quality import FapQuality
 from fat.validate import validate
 from fba.faps import LOW_LEVEL_FAPS
 from fba.findings import Finding
-from studio.checked_skin import CheckedSkin, check_skin
+from studio.checked_skin import CheckedSkin, check_skin, common_points
 from studio.fidelity import Fidelity, fidelity
 from studio.judging import Measured, measure, verdicts
+from studio.truth import beside_truth, require_same_mesh
 from studio.verdicts import Verdict
 
 TOLD_BY_FAP = ("own-fp", "cross-talk", "in-eyes", "seams", "lining", "hidden-stretch", "flips-worst")
@@ -105,19 +106,39 @@ def check_file(path: Path) -> list[Finding]:
 
 
 def check_face(
-    face: AnimatableFace, source: AnimatableFace | None = None, file_findings: Iterable[Finding] = ()
+    face: AnimatableFace,
+    source: AnimatableFace | None = None,
+    file_findings: Iterable[Finding] = (),
+    truth: AnimatableFace | None = None,
 ) -> CheckResult:
-    """Check a face; tables that cannot be played are reported, not measured."""
+    """Check a face; tables that cannot be played are reported, not measured.
+
+    Parameters
+    ----------
+    source : the face it was cloned from.
+    truth : the same mesh, moved as it should be.
+
+    Raises
+    ------
+    MeshError
+        If the truth has another mesh.
+    """
+    if truth is not None:
+        require_same_mesh(face, truth)
     findings = (*file_findings, *validate(face))
     if any(f.severity == "error" for f in findings):
         return CheckResult(findings, True, (), (), None)
     skin = check_skin(face)
-    mine = _measured(face, skin)
-    theirs: Measured | None = mine
-    if source is not face:
-        alike = source is not None and source.scene is face.scene and source.feature_points is face.feature_points
-        theirs = None if source is None else _measured(source, skin if alike else check_skin(source))
+    if source is None or source is face:
+        mine = _measured(face, skin)
+        theirs = mine if source is face else None
+    else:
+        alike = source.scene is face.scene and source.feature_points is face.feature_points
+        other = skin if alike else check_skin(source)
+        points = common_points(skin, other)
+        mine, theirs = _measured(face, skin, points), _measured(source, other, points)
     beside = None if source is None else fidelity(face, source)
+    true = [] if truth is None or skin is None else beside_truth(face, truth, skin)
     seen = {fap.fap_id for fap in mine.own}
     unmeasured = tuple(t.name for t in face.tables if t.fap_id in LOW_LEVEL_FAPS and t.fap_id not in seen)
     return CheckResult(
@@ -128,11 +149,11 @@ def check_face(
         beside,
         mine.rows,
         None if theirs is None else theirs.rows,
-        verdicts(mine, theirs, beside),
+        (*verdicts(mine, theirs, beside), *true),
     )
 
 
-def _measured(face: AnimatableFace, skin: CheckedSkin | None) -> Measured:
+def _measured(face: AnimatableFace, skin: CheckedSkin | None, points: Collection[str] | None = None) -> Measured:
     neutral = Player(face).pose().local
     off = [float(np.abs(neutral[s.name] - s.mesh.vertices).max(initial=0.0)) for s in face.scene.shapes]
-    return measure(face, max(off, default=0.0) / face.fapu.es0, conformance(face), skin)
+    return measure(face, max(off, default=0.0) / face.fapu.es0, conformance(face), skin, points)

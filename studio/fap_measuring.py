@@ -11,7 +11,8 @@ from cloning.lining import coming_through
 from fat.conformance import FapConformance, Probe
 from fat.face import AnimatableFace
 from fat.fap_quality import FapQuality, independent_motion, mirrored, parted, stretch
-from fat.quality import asymmetry, flips, mirror_map
+from fat.folds import largest_fold
+from fat.quality import asymmetry, flips, mirror_map, turned_over
 from fat.tables import FaceDefTable
 from fba.amplitudes import amplitudes
 from fba.arrays import Floats, Ints
@@ -21,7 +22,7 @@ from fba.high_level import BLEND_MAX
 from fba.scene import Role
 from studio.checked_skin import CheckedSkin, check_skin
 from studio.eye_depths import EyeDepths
-from studio.posing import Poses
+from studio.posing import Key, Poses
 
 SYMMETRIC = 1e-3
 """Eye separations by which the vertices of a symmetric mesh may miss their mirror images."""
@@ -48,21 +49,27 @@ def measure_faps(face: AnimatableFace, skin: CheckedSkin | None = None) -> list[
     A row for each direction of each low-level FAP, each viseme and each expression that has a table, in the order
     of the tables, positive direction first. What cannot be measured on this face is None.
     """
-    measurer = FapMeasurer(Poses(face), skin or check_skin(face))
+    poses, skin = Poses(face), skin or check_skin(face)
+    measurer = FapMeasurer(poses, skin, eye_depths(skin, poses))
     return [row for table in face.tables for row in measurer.rows(table)]
+
+
+def eye_depths(skin: CheckedSkin | None, poses: Poses) -> EyeDepths | None:
+    """What tells which skin gets into the eyeballs; None without eyeballs."""
+    return EyeDepths(skin, poses) if skin is not None and skin.eyeballs else None
 
 
 class FapMeasurer:
     """Measures the tables of a face."""
 
-    def __init__(self, poses: Poses, skin: CheckedSkin | None) -> None:
+    def __init__(self, poses: Poses, skin: CheckedSkin | None, eyes: EyeDepths | None) -> None:
         self.face = face = poses.face
         self.poses, self.rest = poses, poses.rest
         self.points = face.feature_points.positions(face.scene, self.rest)
         self.probe = Probe(face, self.rest)
         self.skin = skin
         self.sides = _sides(face)
-        self.eyes = EyeDepths(skin, self.rest) if skin is not None and skin.eyeballs else None
+        self.eyes = eyes
 
     def rows(self, table: FaceDefTable) -> Iterator[FapQuality]:
         """One row for each direction."""
@@ -91,20 +98,23 @@ class FapMeasurer:
             flips_at_limit=None,
             stretch=None,
             parted=None,
-            penetration=self._penetration(world),
+            penetration=self._penetration(key),
             asymmetry=self._asymmetry(table, value, world),
         )
         if self.skin is None:
             return row
         surface = self.skin.surface
         near, wide = (self.skin.offsets(self.face, p) for p in (pose, far))
-        turned = flips(surface.vertices, surface.triangles, near)
+        moving, over = turned_over(surface.vertices, surface.triangles, near)
+        turned = 100.0 * len(over) / moving if moving else 0.0
+        shown = surface.triangles[over]
         return replace(
             row,
             flips=turned,
             flips_at_limit=turned if far is pose else flips(surface.vertices, surface.triangles, wide),
             stretch=stretch(surface.vertices, self.skin.hidden_edges, near),
             parted=parted(surface.links, wide),
+            fold=largest_fold(surface.vertices, shown[self.skin.seen[shown].all(axis=1)]),
             through=len(coming_through(surface, self.skin.seen, self.skin.labels, self.skin.lining, near)),
         )
 
@@ -125,11 +135,11 @@ class FapMeasurer:
         steps = [float(np.linalg.norm(v - self.rest[n], axis=1).max(initial=0.0)) for n, v in world.items()]
         return independent_motion(fap(table.fap_id), motion, self.face.fapu, max(steps, default=0.0))
 
-    def _penetration(self, world: Mapping[str, Floats]) -> float | None:
+    def _penetration(self, key: Key) -> float | None:
         """Percent of the skin before the eyeballs that gets into them."""
         if self.eyes is None:
             return None
-        sunk = self.eyes.sunk(world)
+        sunk = self.eyes.sunk(key)
         return 100.0 * float(np.mean(sunk)) if len(sunk) else 0.0
 
     def _asymmetry(self, table: FaceDefTable, value: int, world: Mapping[str, Floats]) -> float | None:

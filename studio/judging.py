@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 
 from fat.conformance import FapConformance
 from fat.face import AnimatableFace
 from fat.fap_quality import FapQuality
-from fat.held_out import misplaced
+from fat.held_out import misplaced, uneven
 from fba.errors import LandmarkError
 from fba.faps import faps
 from fba.fapu import FAPU_POINTS, Fapu
+from fba.scene import Role
 from studio.checked_skin import CheckedSkin
-from studio.fap_measuring import FapMeasurer
+from studio.fap_measuring import FapMeasurer, eye_depths
 from studio.fidelity import Fidelity
 from studio.measures import BY_CODE
 from studio.motion_measuring import MotionMeasurer, MotionMeasures
@@ -24,6 +25,7 @@ VAGUE = ("2.13", "2.14")
 PLACED = ("2.", "3.", "4.", "5.", "8.", "9.")
 """Groups of feature points with a definite place; ears, hair, tongue and skull have none that every face shares, nor
 have the corners of the jaw (VAGUE)."""
+PUPILS = ("3.5", "3.6")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +47,26 @@ class Measured:
     motions: tuple[MotionMeasures, ...]
 
 
-def measure(face: AnimatableFace, neutral: float, own: Sequence[FapConformance], skin: CheckedSkin | None) -> Measured:
-    """Measure a face whose tables can be played; `skin` is None for a face without any."""
+def measure(
+    face: AnimatableFace,
+    neutral: float,
+    own: Sequence[FapConformance],
+    skin: CheckedSkin | None,
+    points: Collection[str] | None = None,
+) -> Measured:
+    """Measure a face whose tables can be played.
+
+    Parameters
+    ----------
+    skin : None for a face without any.
+    points : feature points on its skin by whose places it is compared with another face; None: all of them.
+    """
     poses = Poses(face)
-    by_fap = FapMeasurer(poses, skin)
-    by_motion = None if skin is None else MotionMeasurer(poses, skin)
+    eyes = eye_depths(skin, poses)
+    by_fap = FapMeasurer(poses, skin, eyes)
+    by_motion = None
+    if skin is not None:
+        by_motion = MotionMeasurer(poses, skin, skin.surface.points if points is None else points, eyes)
     rows: list[FapQuality] = []
     motions: list[MotionMeasures] = []
     for table in face.tables:  # Table by table, so that both read the same poses.
@@ -64,6 +81,7 @@ def verdicts(mine: Measured, theirs: Measured | None, beside: Fidelity | None) -
     found += [judge("fapu", _fapu(mine.face)), judge("own-fp", _own(mine, theirs))]
     if theirs is not None:
         found.append(judge("points", _points(mine.face, theirs.face)))
+    found.append(judge("point-sides", _point_sides(mine.face)))
     found += [judge(code, _rows(mine, theirs, read)) for code, read in _ROWS.items()]
     found += [] if beside is None else _fidelity(beside)
     found += judge_motions(mine.motions, None if theirs is None else theirs.motions)
@@ -75,6 +93,7 @@ _ROWS: dict[str, Callable[[FapQuality], float | None]] = {
     "cross-talk": lambda row: None if row.cross_talk is None else 100.0 * row.cross_talk,
     "in-eyes": lambda row: row.penetration,
     "flips-worst": lambda row: row.flips,
+    "fold": lambda row: row.fold,
     "symmetry": lambda row: None if row.high_level else row.asymmetry,
     "seams": lambda row: row.parted,
     "lining": lambda row: row.through,
@@ -126,9 +145,21 @@ def _fapu(face: AnimatableFace) -> Iterator[Reading]:
 
 def _points(face: AnimatableFace, source: AnimatableFace) -> Iterator[Reading]:
     off = misplaced(source.feature_points.positions(source.scene), face.feature_points.positions(face.scene))
-    for key, value in off.items():
-        if key.startswith(PLACED) and key not in VAGUE and face.feature_points[key].shape is not None:
-            yield Reading(value, 0.0, "", Place(None, None, key))
+    for key in _placed(face, off):
+        yield Reading(off[key], 0.0, "", Place(None, None, key))
+
+
+def _point_sides(face: AnimatableFace) -> Iterator[Reading]:
+    off = uneven(face.feature_points.positions(face.scene))
+    for key in _placed(face, off):
+        yield Reading(off[key], None, "", Place(None, None, key))
+
+
+def _placed(face: AnimatableFace, keys: Iterable[str]) -> Iterator[str]:
+    """The points with a definite place: on a surface, and pupils only where there are eyeballs."""
+    eyeballs = face.scene.with_role(Role.EYE_LEFT) and face.scene.with_role(Role.EYE_RIGHT)
+    known = (k for k in keys if k.startswith(PLACED) and k not in VAGUE and face.feature_points[k].shape is not None)
+    return (k for k in known if eyeballs or k not in PUPILS)
 
 
 def _fidelity(beside: Fidelity) -> list[Verdict | None]:

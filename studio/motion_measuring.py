@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from fat.fap_quality import DEPTH
-from fat.intersections import crossing
 from fat.lip_contact import lip_depth
-from fat.quality import edge_stretch, roughness
+from fat.quality import roughness
 from fat.tables import FaceDefTable
-from fat.tearing import SLACK, bending, jumps
+from fat.tearing import SLACK, angles, bending, jumps, reach, stretching
 from fba.amplitudes import amplitudes
 from fba.arrays import Bools, Floats, Ints
 from fba.faps import EXPRESSION_FAP
 from fba.high_level import BLEND_MAX
-from fba.scene import Role
 from studio.checked_skin import CheckedSkin
+from studio.collisions import LOWER, UPPER, Collisions
+from studio.eye_depths import EyeDepths
+from studio.face_places import Places
 from studio.posing import Poses
+from studio.spot import Spot
 
 MOVING = 0.02
 """Share of the largest offset from which a place takes part in a motion."""
@@ -28,21 +28,13 @@ MOVING = 0.02
 TORN = 10
 """A tear is as steep as its tenth-steepest edge: one or two bad edges are a flaw of the mesh, not a tear."""
 
-NEAR_TEETH = 0.25
-"""Lips nearer than this to a tooth at rest are watched, in eye separations: a lip is .2 thick."""
+MOST, TYPICAL = 0.9, 0.5
+"""A place stretches as most of its edges do, and bends as its typical hinge does: a crease bends a few, waves all."""
+
+MM = 63.0
+"""Millimetres of an adult's eye separation, for bends in degrees per millimetre."""
 
 EAR_FAPS = (65, 66, 67, 68)
-UPPER, LOWER = 1, 2
-"""Labels of the lips, see `cloning.labels`."""
-
-
-@dataclass(frozen=True, slots=True)
-class Spot:
-    """A measure and where it is worst: a vertex of the joined skin, or a feature point."""
-
-    value: float
-    vertex: int | None = None
-    point: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +46,14 @@ class MotionMeasures:
     key : FAP, select, value.
     grain : typical length of the edges that move, in eye separations.
     spots : measure -> its value here; what cannot be measured is absent.
+    places : measure -> place -> its value there, of measures that are read place by place, see `studio.face_places`.
     """
 
     key: tuple[int, int, int]
     name: str
     grain: float
     spots: Mapping[str, Spot]
+    places: Mapping[str, Mapping[str, Spot]]
 
     @property
     def where(self) -> str:
@@ -68,15 +62,28 @@ class MotionMeasures:
 
 
 class MotionMeasurer:
-    """Measures the motions of a face."""
+    """Measures the motions of a face.
 
-    def __init__(self, poses: Poses, skin: CheckedSkin) -> None:
+    Parameters
+    ----------
+    points : feature points by whose places two faces are compared, all of them on this skin.
+    eyes : which skin gets into the eyeballs; None for a face without.
+    """
+
+    def __init__(self, poses: Poses, skin: CheckedSkin, points: Collection[str], eyes: EyeDepths | None) -> None:
         self.face, self.skin = poses.face, skin
         self.poses, self.rest = poses, poses.rest
+        self.collisions = Collisions(poses, skin, eyes)
+        rest = skin.surface.vertices
+        self.edges = Places(skin, points, skin.seen_edges)
+        self.lengths = _lengths(rest, self.edges.members)
+        self.hinges = Places(skin, points, skin.seen_hinges)
+        self.angles = angles(rest, self.hinges.members)
+        self.reach = MM * (reach(rest, self.hinges.members) + SLACK)
         self.upper, self.lower = (
             np.flatnonzero((skin.labels == k) & skin.seen).astype(np.int32) for k in (UPPER, LOWER)
         )
-        self.lip_rest = self._lip_depth(np.zeros_like(skin.surface.vertices))
+        self.lip_rest = self._lip_depth(np.zeros_like(rest))
 
     def motions(self, table: FaceDefTable) -> Iterator[MotionMeasures]:
         """The motions of a table: both directions of a FAP, a viseme or an expression."""
@@ -86,7 +93,6 @@ class MotionMeasurer:
 
     def _motion(self, key: tuple[int, int, int], name: str) -> MotionMeasures:
         """All measures of one motion."""
-        world = self.poses.world(key)
         offsets = self.skin.offsets(self.face, self.poses.pose(key))
         size = np.linalg.norm(offsets, axis=1)
         moving = size > MOVING * size.max(initial=0.0)
@@ -94,128 +100,53 @@ class MotionMeasurer:
         edges = edges[moving[edges].any(axis=1)]
         ends = self.skin.surface.vertices[edges]
         grain = float(np.median(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1))) if len(edges) else 0.0
-        spots = dict(self._shape(offsets, moving, edges))
-        spots |= self._contacts(offsets, moving, world)
+        spots = dict(self._shape(offsets, edges))
+        spots |= dict(self._lips(offsets, moving))
+        spots |= dict(self.collisions.spots(key))
         if key[0] not in EAR_FAPS and self.skin.back.any():
-            behind = np.where(self.skin.back, size, 0.0)
-            spots["still"] = _worst(behind)
-        return MotionMeasures(key, name, grain, spots)
+            spots["still"] = _worst(np.where(self.skin.back, size, 0.0))
+        places = {"stretch": dict(self._stretches(offsets, moving)), "bend": dict(self._bends(offsets, moving))}
+        return MotionMeasures(key, name, grain, spots, places)
 
-    def _shape(self, offsets: Floats, moving: Bools, edges: Ints) -> Iterator[tuple[str, Spot]]:
+    def _shape(self, offsets: Floats, edges: Ints) -> Iterator[tuple[str, Spot]]:
         """How smoothly the skin moves."""
-        rest = self.skin.surface.vertices
         if not len(edges):
-            yield from ((name, Spot(0.0)) for name in ("tear", "stretch99", "noise", "bend"))
+            yield from ((name, Spot(0.0)) for name in ("tear", "noise"))
             return
-        steep = jumps(rest, edges, offsets)
+        steep = jumps(self.skin.surface.vertices, edges, offsets)
         order = np.argsort(-steep, kind="stable")
         yield "tear", Spot(float(steep[order[min(TORN, len(order)) - 1]]), int(edges[order[0], 0]))
-        yield "stretch99", Spot(edge_stretch(rest, edges, offsets), _longest(rest, edges, offsets))
-        rough = roughness(self.skin.surface.edges, offsets)
-        yield "noise", Spot(rough, int(edges[order[0], 0]))
-        bends = self.skin.seen_hinges
-        bends = bends[moving[bends].any(axis=1)]
-        degrees = bending(rest, bends, offsets)
-        if len(degrees):
-            yield "bend", Spot(float(np.percentile(degrees, 95)), int(bends[int(np.argmax(degrees)), 0]))
+        yield "noise", Spot(roughness(self.skin.surface.edges, offsets, self.skin.seen), int(edges[order[0], 0]))
 
-    def _contacts(self, offsets: Floats, moving: Bools, world: Mapping[str, Floats]) -> dict[str, Spot]:
-        """What the skin sinks into."""
-        spots = {}
+    def _stretches(self, offsets: Floats, moving: Bools) -> Iterator[tuple[str, Spot]]:
+        """How much the edges of each place stretch."""
+        edges = self.edges.members
+        some: Bools = np.any(moving[edges], axis=1)
+        after = _lengths(self.skin.surface.vertices + offsets, edges[some])
+        for name, value, at in self.edges.quantiles(MOST, some, stretching(self.lengths[some], after)):
+            yield name, Spot(value, int(edges[at, 0]))
+
+    def _bends(self, offsets: Floats, moving: Bools) -> Iterator[tuple[str, Spot]]:
+        """How sharply each place bends."""
+        hinges = self.hinges.members
+        some: Bools = np.any(moving[hinges], axis=1)
+        after = angles(self.skin.surface.vertices + offsets, hinges[some])
+        sharp = bending(self.angles[some], after) / self.reach[some]
+        for name, value, at in self.hinges.quantiles(TYPICAL, some, sharp):
+            yield name, Spot(value, int(hinges[at, 0]))
+
+    def _lips(self, offsets: Floats, moving: Bools) -> Iterator[tuple[str, Spot]]:
+        """How deep the lips sink into each other."""
         if len(self.upper) and len(self.lower):
             lips = moving[self.upper].any() or moving[self.lower].any()
             depth, vertices = self._lip_depth(offsets) if lips else self.lip_rest
             added = np.maximum(depth - self.lip_rest[0], 0.0)
-            spots["lip-depth"] = Spot(float(added.max()), int(vertices[int(np.argmax(added))]))
-        for name, places in self._obstacles.items():
-            spots[name] = self._collisions(name, places, world)
-        return spots
+            yield "lip-depth", Spot(float(added.max()), int(vertices[int(np.argmax(added))]))
 
     def _lip_depth(self, offsets: Floats) -> tuple[Floats, Ints]:
         surface, fapu = self.skin.surface, self.face.fapu
         places = surface.vertices + offsets
         return lip_depth(places, surface.normals_of(places), self.upper, self.lower, fapu.mns0 / fapu.es0)
-
-    def _collisions(self, name: str, obstacle: _Obstacle, world: Mapping[str, Floats]) -> Spot:
-        """Percent of the watched skin that crosses something in a motion, but not at rest."""
-        some = np.arange(len(obstacle.watched), dtype=np.int32)
-        if all(np.array_equal(world[n], self.rest[n]) for names, _ in obstacle.bodies for n in names):
-            moved = [np.any(world[n] != self.rest[n], axis=1) for n in self.skin.surface.shapes]
-            some = some[np.concatenate(moved)[self.skin.surface.triangles[obstacle.watched]].any(axis=1)]
-        here = some[self._crossing(obstacle, world, some)] if len(some) else some
-        new = here[~np.isin(here, self._at_rest[name])]
-        corners = self.skin.surface.triangles[obstacle.watched[new]].ravel()
-        seen = corners[self.skin.seen[corners]]
-        vertex = int((seen if len(seen) else corners)[0]) if len(new) else None
-        return Spot(100.0 * len(new) / len(obstacle.watched), vertex)
-
-    def _crossing(self, obstacle: _Obstacle, world: Mapping[str, Floats], some: Ints) -> Ints:
-        """Which of some of the watched triangles cross a body."""
-        corners = self.skin.surface.triangles[obstacle.watched[some]]
-        skin = np.concatenate([world[n] for n in self.skin.surface.shapes])[corners]
-        found = []
-        for shapes, center in obstacle.bodies:
-            moved = sum(float(len(world[n])) for n in shapes)
-            shift = sum((world[n] - self.rest[n]).sum(axis=0) for n in shapes) / moved
-            for shape in shapes:
-                places = world[shape]
-                if center is not None:
-                    middle = center + shift
-                    places = middle + (1.0 - DEPTH) * (places - middle)
-                found.append(crossing(skin, places[self.face.scene.shape(shape).mesh.triangles]))
-        hit: Ints = np.unique(np.concatenate(found))
-        return hit
-
-    @cached_property
-    def _at_rest(self) -> dict[str, Ints]:
-        return {
-            n: self._crossing(o, self.rest, np.arange(len(o.watched), dtype=np.int32))
-            for n, o in self._obstacles.items()
-        }
-
-    @cached_property
-    def _obstacles(self) -> dict[str, _Obstacle]:
-        """Eyeballs before the lids, teeth before the lips; what is not there is absent."""
-        found = {}
-        triangles = self.skin.surface.triangles
-        teeth = [s.name for r in (Role.UPPER_TEETH, Role.LOWER_TEETH) for s in self.face.scene.with_role(r)]
-        teeth = [name for name in teeth if len(self.face.scene.shape(name).mesh.triangles)]
-        lips = np.isin(self.skin.labels, (UPPER, LOWER)) & self._before(teeth)
-        balls = []
-        around = np.zeros(len(lips), dtype=bool)
-        for ball, names in self.skin.eyeballs:
-            around[ball.vertices[ball.rest[:, 2] > ball.center[2]]] = True
-            balls.append((tuple(names), ball.center))
-        for name, where, bodies in (
-            ("lids", around, tuple(balls)),
-            ("teeth", lips, tuple(((n,), None) for n in teeth)),
-        ):
-            watched = np.flatnonzero(where[triangles].all(axis=1)).astype(np.int32)
-            if bodies and len(watched):
-                found[name] = _Obstacle(watched, bodies)
-        return found
-
-    def _before(self, teeth: list[str]) -> Bools:
-        """(n,) the skin near some teeth at rest."""
-        from scipy.spatial import cKDTree
-
-        if not teeth:
-            return np.zeros(self.skin.surface.vertex_count, dtype=bool)
-        es0 = self.face.fapu.es0
-        tree = cKDTree(np.concatenate([self.rest[n] for n in teeth]) / es0)
-        away = tree.query(self.skin.surface.vertices, distance_upper_bound=NEAR_TEETH)[0]
-        return np.asarray(away) < NEAR_TEETH
-
-
-@dataclass(frozen=True, eq=False)
-class _Obstacle:
-    """What skin must not sink into: triangles (t,) of the skin, and bodies by their shapes.
-
-    A body with a centre is made smaller about it by DEPTH, which is how far skin may sink in.
-    """
-
-    watched: Ints
-    bodies: tuple[tuple[tuple[str, ...], Floats | None], ...]
 
 
 def _worst(values: Floats) -> Spot:
@@ -223,8 +154,8 @@ def _worst(values: Floats) -> Spot:
     return Spot(float(values[at]), at)
 
 
-def _longest(vertices: Floats, edges: Ints, offsets: Floats) -> int:
-    """An end of the edge that changes its length most, measured beside it and SLACK."""
-    moved = vertices + offsets
-    before, after = (np.linalg.norm(v[edges[:, 0]] - v[edges[:, 1]], axis=1) + SLACK for v in (vertices, moved))
-    return int(edges[int(np.argmax(np.abs(np.log(after / before)))), 0])
+def _lengths(vertices: Floats, edges: Ints) -> Floats:
+    """(e,) of edges."""
+    away = vertices[edges[:, 0]] - vertices[edges[:, 1]]
+    lengths: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
+    return lengths

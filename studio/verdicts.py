@@ -69,7 +69,7 @@ class Verdict:
         """The failure in plain words; an error if it is a must."""
         measure = self.measure
         beside = "" if not self.source else f" (the source's {self.source:.3g})"
-        unit = "" if measure.rule == "times" else f" {measure.unit}"
+        unit = "" if measure.unit == "times" else f" {measure.unit}"
         limit = "" if self.limit is None else f", at most {self.limit:.3g}"
         text = f"{measure.title}: {self.value:.3g}{unit}{beside}{limit}"
         where = " ".join(t for t in (self.where, f"at point {self.place.point}" if self.place.point else "") if t)
@@ -128,10 +128,22 @@ def _readings(
     code: str, mine: Sequence[MotionMeasures], beside: Mapping[tuple[int, int, int], MotionMeasures] | None
 ) -> Iterator[Reading]:
     for motion in mine:
-        spot = motion.spots.get(code)
         other = None if beside is None else beside.get(motion.key)
-        if spot is None or (beside is not None and other is None):
+        if beside is not None and other is None:
             continue
-        theirs = None if other is None or code not in other.spots else other.spots[code].value
         coarser = motion.grain / other.grain if other is not None and other.grain > 0.0 else 1.0
-        yield Reading(spot.value, theirs, motion.where, Place(motion.key, spot.vertex, spot.point), coarser)
+        spot = motion.spots.get(code)
+        if spot is not None:
+            theirs = None if other is None or code not in other.spots else other.spots[code].value
+            yield Reading(spot.value, theirs, motion.where, Place(motion.key, spot.vertex, spot.point), coarser)
+        there = None if other is None else other.places.get(code, {})
+        for name, spot in motion.places.get(code, {}).items():
+            if there is None or name in there:
+                theirs = None if there is None else there[name].value
+                where = f"{motion.where}, {_by(name)}"
+                yield Reading(spot.value, theirs, where, Place(motion.key, spot.vertex, spot.point), coarser)
+
+
+def _by(place: str) -> str:
+    """A place in words: feature points are numbers."""
+    return f"by point {place}" if place[0].isdigit() else place

@@ -144,14 +144,14 @@ class _View:
         """A vertex where a motion breaks the rule of a measure that counts, one that is seen if any; None: nowhere."""
         surface = skin.surface
         found: Ints = np.zeros(0, dtype=np.int32)
-        if code.startswith("flips"):
+        if code == "fold" or code.startswith("flips"):
             found = surface.triangles[turned_over(surface.vertices, surface.triangles, offsets)[1], 0]
         elif code == "seams":
             gap = np.linalg.norm(offsets[surface.links[:, 0]] - offsets[surface.links[:, 1]], axis=1)
             found = surface.links[gap > APART, 0]
         elif code == "in-eyes" and skin.eyeballs:
-            depths = EyeDepths(skin, self.poses.rest)
-            found = depths.vertices[depths.sunk(self.poses.world(motion))]
+            depths = EyeDepths(skin, self.poses)
+            found = depths.vertices[depths.sunk(motion)]
         elif code == "lining":
             found = coming_through(surface, skin.seen, skin.labels, skin.lining, offsets)
         seen = found[skin.seen[found]]

@@ -53,6 +53,10 @@ def check(
     source: Annotated[
         str | None, typer.Option(help="The face it was cloned from ('default'): compare every motion.")
     ] = None,
+    truth: Annotated[
+        str | None,
+        typer.Option(help="The same mesh with the motion that it should have, as an animatable face: how far is it?"),
+    ] = None,
     worst: Annotated[bool, typer.Option(help="Show the worst motions first.")] = False,
     sheet: Annotated[
         Path | None, typer.Option(help="Also draw every FAP, viseme and expression into this .png.")
@@ -74,8 +78,9 @@ def check(
 ) -> None:
     """Check conformance and quality of every FAP, viseme and expression; ends with 1 when something fails."""
     if stream is not None or golden is not None:
-        if source is not None or sheet is not None or worst_picture is not None:
-            usage("--golden compares the frames of a player; it does not go with --source, --sheet or --worst-picture")
+        if any(given is not None for given in (source, truth, sheet, worst_picture)):
+            others = "--source, --truth, --sheet or --worst-picture"
+            usage(f"--golden compares the frames of a player; it does not go with {others}")
         check_golden(face, stream, golden, rules, as_json)
         return
     from formats import read_face
@@ -87,7 +92,8 @@ def check(
             _check_picture(name, path)
     animatable = read_face(str(face))
     beside = None if source is None else read_face(source)
-    result = check_face(animatable, beside, check_file(face))
+    real = None if truth is None else read_face(truth)
+    result = check_face(animatable, beside, check_file(face), real)
     plays = not any(f.severity == "error" for f in result.findings)
     if sheet is not None and plays:
         _draw(animatable, sheet)
@@ -167,7 +173,7 @@ def _last_line(result: CheckResult) -> str:
 def _measure_cells(verdict: Verdict) -> tuple[str, ...]:
     """One line of the table of measures."""
     measure = verdict.measure
-    unit = "" if measure.rule == "times" else measure.unit
+    unit = "" if measure.unit == "times" else measure.unit
     numbers = [
         "-" if v is None else "0" if abs(v) < 1e-9 else f"{v:.3g}"
         for v in (verdict.value, verdict.source, verdict.limit)

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from fat.conformance import widening
-from fat.held_out import NAMED, held_out_error, misplaced
-from fat.quality import flips, turned_over
-from fat.tearing import SLACK, bending, hinges, jumps
+from fat.folds import largest_fold
+from fat.held_out import NAMED, held_out_error, misplaced, uneven
+from fat.quality import flips, roughness, turned_over
+from fat.tearing import SHORT, SLACK, angles, bending, hinges, jumps, reach, stretching
+from fba import PolyMesh
+from fba.feature_points import feature_point_definitions
 
 
 def strip(count: int = 20, step: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
@@ -40,9 +43,67 @@ def test_a_hinge_bends_by_the_angle_that_its_flap_turns(degrees: float) -> None:
     turn = np.radians(degrees)
     offsets = np.zeros((4, 3))
     offsets[3] = np.array([np.cos(turn), 0.5, np.sin(turn)]) - vertices[3]
-    assert bending(vertices, bends, offsets) == pytest.approx([degrees])
+    rest = angles(vertices, bends)
+    assert bending(rest, angles(vertices + offsets, bends)) == pytest.approx([degrees])
     rigid = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
-    assert bending(vertices, bends, vertices @ rigid.T - vertices) == pytest.approx([0.0], abs=1e-6)
+    assert bending(rest, angles(vertices @ rigid.T, bends)) == pytest.approx([0.0], abs=1e-6)
+
+
+def test_a_cylinder_bends_as_sharply_on_any_mesh() -> None:
+    for count in (20, 60):
+        turn = np.linspace(0.0, 1.0, count)
+        flat, round_ = (
+            np.concatenate([np.stack([x, 0 * x + y, z], axis=1) for y in (0.0, 0.1)])
+            for x, z in ((turn, 0 * turn), (np.sin(turn), np.cos(turn)))
+        )
+        quads = [[k, k + 1, count + k + 1, count + k] for k in range(count - 1)]
+        bends = hinges(PolyMesh.from_faces(flat, quads).triangles)
+        across = bends[np.abs(flat[bends[:, 0], 0] - flat[bends[:, 1], 0]) < 1e-9]
+        change = bending(angles(flat, across), angles(round_, across))
+        # Both triangles reach a third of a step each; the facets of a cylinder turn by a step's angle.
+        assert np.radians(change) / reach(flat, across) == pytest.approx(np.full(count - 2, 1.5), rel=0.01)
+
+
+def test_a_tiny_edge_stretches_little() -> None:
+    assert stretching(np.array([1.0, 0.0]), np.array([2.0, SHORT])) == pytest.approx(
+        [np.log(2.0), np.log(2.0)], rel=0.01
+    )
+    assert stretching(np.array([2.0]), np.array([1.0])) == pytest.approx([np.log(2.0)], rel=0.01)
+
+
+def test_a_fold_is_as_large_as_the_triangles_that_touch_along_edges() -> None:
+    grid = np.array([[x, y, 0.0] for y in range(3) for x in range(3)])
+    side_by_side = np.array([[0, 1, 4], [0, 4, 3], [4, 5, 8]], np.int32)  # the third touches at a corner only
+    assert largest_fold(grid, side_by_side) == pytest.approx(1.0)
+    assert largest_fold(0.1 * grid, side_by_side[2:]) == pytest.approx(0.1 * np.sqrt(0.5))
+    assert largest_fold(grid, side_by_side[:0]) == 0.0
+
+
+def test_a_point_on_one_side_only_lies_off_its_counterparts_mirror_image() -> None:
+    rng = np.random.default_rng(5)
+    pairs = {k: c for k, d in feature_point_definitions().items() if (c := d.counterpart) is not None and k < c}
+    places = {}
+    for one, other in pairs.items():
+        x, y, z = rng.uniform(0.1, 1.0, 3)
+        places |= {one: np.array([x, y, z]), other: np.array([-x, y, z])}
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turned = {k: turn @ p + [5.0, 6.0, 7.0] for k, p in places.items()}
+    assert max(uneven(turned).values()) < 1e-9, "a face may be turned and stand aside"
+    width = np.mean([np.linalg.norm(places[a] - places[b]) for a, b in (("3.7", "3.11"), ("3.8", "3.12"))])
+    turned["8.3"] = turned["8.3"] + turn @ [0.0, 0.6 * width, 0.0]
+    off = uneven(turned)
+    assert {k for k, v in off.items() if v > 0.3} == {"8.3", "8.4"}
+    assert off["8.3"] == pytest.approx(0.6, abs=0.05)
+    assert uneven({k: turned[k] for k in ("3.7", "3.11", "3.8", "3.12")}) == {}
+
+
+def test_roughness_is_read_where_it_is_asked() -> None:
+    _, edges = strip()
+    offsets = np.ones((20, 3))
+    offsets[15] = 2.0
+    head = np.arange(20) < 10
+    assert roughness(edges.astype(np.int32), offsets, head) == pytest.approx(0.0)
+    assert roughness(edges.astype(np.int32), offsets, ~head) > 0.1
 
 
 def test_only_edges_of_two_triangles_that_agree_are_hinges() -> None:

@@ -159,6 +159,23 @@ def test_lids_that_stay_on_the_ball_are_clear_of_it() -> None:
     assert played(shapes, [(19, 1024, {"skin": inwards})], points)[0].penetration == 50.0
 
 
+def test_the_back_of_a_lid_may_sink_in_where_its_front_does_not() -> None:
+    shapes, points = eyes()
+    skin = shapes[0].mesh
+    inner = PolyMesh.from_faces(
+        np.concatenate([skin.vertices, sphere((0.8, 0, 0), 0.44, front=True).vertices]),
+        [*skin.triangles.tolist(), *(sphere((0.8, 0, 0), 0.44, front=True).triangles + len(skin.vertices)).tolist()],
+    )
+    back = np.arange(inner.vertex_count) >= len(skin.vertices)
+    inwards = -0.3 * (inner.vertices - [0.8, 0, 0]) * [1.0, 1.0, 1.0]
+    lids = (Shape("skin", inner, Role.SKIN), *shapes[1:])
+    only_back = np.where(back[:, None], inwards, 0.0)
+    assert played(lids, [(19, 1024, {"skin": only_back})], points)[0].penetration == pytest.approx(0.0, abs=3.0)
+    left = inner.vertices[:, 0] > 0
+    both = np.where(left[:, None], inwards, 0.0)
+    assert played(lids, [(19, 1024, {"skin": both})], points)[0].penetration > 30.0  # type: ignore[operator]
+
+
 def test_a_turning_eye_takes_its_surface_along() -> None:
     shapes, points = eyes()
     ball = shapes[1].mesh.vertices - [0.8, 0, 0]
