@@ -90,7 +90,7 @@ BARS = (
     Bar("whole `fba clone`, 20k vertices, files included, s", "whole clone", 20, 6),
     Bar("template fit, 5k, s", "fit, 5k", 3, 0.5),
     Bar("template fit, 20k, s", "fit, 20k", 8, 2.5),
-    Bar("playback of a cloned 20k face, head at rest, frames/s", "frames/s, 20k", 1000, 5000, True),
+    Bar("playback of a cloned 20k face, head at rest, 4-byte numbers, frames/s", "frames/s, 20k", 1000, 5000, True),
     Bar("picture analogy, set-up with the first expression, s", "analogy, set-up", 3, 1),
     Bar("picture analogy, each further expression, s", "analogy, expression", 0.1, 0.05),
     Bar("VRML with 100k vertices, read, s", "read .wrl, 100k", 1, 0.3),
@@ -136,9 +136,9 @@ def values(found: Mapping[str, Any]) -> dict[str, float]:
         if row["backend"] == "fit":
             known["whole clone"] = row["whole"]
     stages, transfers = found.get("stages", {}), found.get("transfers", {})
-    for size in stages:
-        known[f"frames/s, {size}"] = stages[size]["frames/s, head at rest"]
-        known[f"read .wrl, {size}"] = stages[size]["read .wrl"]
+    for size, row in stages.items():
+        rows = {"frames/s": "frames/s, head at rest, 4-byte numbers", "read .wrl": "read .wrl"}
+        known |= {f"{what}, {size}": row[name] for what, name in rows.items() if name in row}
     for row in found.get("peers", ()):
         if row["work"].startswith("template fit"):
             known["fit, 5k" if int(re.sub(r"\D", "", row["work"])) < LARGE else "fit, 20k"] = row["ours"]

@@ -44,7 +44,7 @@ REASONS: dict[str, str] = {
     ),
     "fit, 20k": "as at 5k, and the two factors of the whole template",
     "frames/s, 20k": (
-        "every FAP, two visemes and two expressions at once, with all combination rules, in 8-byte numbers"
+        "every FAP, two visemes and two expressions at once, other values in each frame, with all combination rules"
     ),
     "analogy, set-up": "one factor of all pixels in the mask and the warp",
     "analogy, expression": "the warp and composition of the picture, besides one solve",

@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.clone_speed import Stages
 from benchmarks.playback import full_stream
 from benchmarks.report.heads import sized, skin_motions, source
+from benchmarks.report.player import played
 from benchmarks.report.processes import seconds
 from cloning import clone_with_report
 from cloning.correct import correction
@@ -57,15 +58,9 @@ def stages(size: str) -> dict[str, float]:
             found[f"MB {extension}"] = path.stat().st_size / 1e6
     for what, turning in (("head at rest", False), ("head turning", True)):
         stream = full_stream(FRAMES, turning)
-        player = Player(cloned)
-        next(player.world_frames(stream))
-        found[f"frames/s, {what}"] = FRAMES / seconds(lambda s=stream, p=player: _play(p, s), 3)  # type: ignore[misc]
+        for numbers, single in (("", False), (", 4-byte numbers", True)):
+            found[f"frames/s, {what}{numbers}"] = played(Player(cloned), stream, single)
     return found
-
-
-def _play(player: Player, stream: object) -> None:
-    for _ in player.world_frames(stream):  # type: ignore[arg-type]
-        pass
 
 
 def _corrected(face: object, count: int) -> float:

@@ -82,9 +82,9 @@ def peer_table(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def playback_table(faces: Mapping[str, Mapping[str, float]]) -> str:
     """Frames per second of the player and of a plain loop."""
-    lines = [head("", ["head turning", "head at rest", "plain sum", "plain numpy loop", "player / loop"])]
+    lines = [head("", [*next(iter(faces.values())), "plain sum / plain loop"])]
     for what, row in faces.items():
-        speeds = [f"{row[k]:,.0f}" for k in ("head turning", "head at rest", "by the plain sum", "plain loop")]
+        speeds = [f"{speed:,.0f}" for speed in row.values()]
         lines.append(f"| {what} | {' | '.join(speeds)} | {row['by the plain sum'] / row['plain loop']:.0f} |")
     return "\n".join(lines) + "\n"
 

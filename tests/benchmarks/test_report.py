@@ -142,7 +142,7 @@ def test_parts_are_chosen() -> None:
 
 
 def test_bars_are_read_from_the_parts() -> None:
-    row = {"frames/s, head at rest": 3000.0, "read .wrl": 0.2, "motions": 0.1, "memory": 300.0}
+    row = {"frames/s, head at rest, 4-byte numbers": 3000.0, "read .wrl": 0.2, "motions": 0.1, "memory": 300.0}
     other = {**row, "memory": 340.0}
     found = bars.values(
         {
@@ -153,6 +153,7 @@ def test_bars_are_read_from_the_parts() -> None:
         }
     )
     assert found["whole clone"] == 9.0
+    assert found["frames/s, 20k"] == 3000.0
     assert found["memory, 20k"] == 340.0
     assert found["motions, dt, 20k"] == 0.1
     assert (found["fit, 5k"], found["fit, 20k"]) == (0.7, 2.3)
