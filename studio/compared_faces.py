@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from cloning.backends import find_backend
 from cloning.detect import detect_points
 from cloning.prepare import PreparedFace, prepare
 from fat.face import AnimatableFace
@@ -14,7 +15,11 @@ from fba.feature_points import FeaturePoints
 from fba.findings import Finding
 from fba.scene import FaceScene
 from formats import read, read_face
+from studio.comparison import Way
 from studio.inputs import points_of
+
+AUTO = "auto"
+"""The detector of all backends in their default mode."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +32,19 @@ class Model:
     path : as given; two models of one path are one face.
     neutral : what was read, a plain scene or a face with tables.
     points : feature points in the file's axes; None where they have to be found.
+    found : the points were found, not given.
     """
 
     name: str
     path: str
     neutral: FaceScene | AnimatableFace
     points: FeaturePoints | None
+    found: bool = False
+
+    def points_for(self, way: Way) -> FeaturePoints | None:
+        """The points; None where a published backend is to find them by its own detector."""
+        its_own = way.as_published and find_backend(way.backend).detector != AUTO
+        return None if self.found and its_own else self.points
 
 
 def read_model(path: str) -> Model:
@@ -51,7 +63,7 @@ def read_models(paths: Sequence[str]) -> tuple[dict[str, Model], list[Finding]]:
             model = read_model(path)
             if model.points is None and isinstance(model.neutral, FaceScene):
                 known = known or _shipped()
-                model = replace(model, points=detect_points(model.neutral, known).points)
+                model = replace(model, points=detect_points(model.neutral, known).points, found=True)
             models[path] = model
         except FbaError as error:
             findings.append(Finding("error", "left-out", f"left out: {error}", path))

@@ -223,7 +223,7 @@ class _Comparer:
             if generation:
                 there = clone(there, face, backend=way.backend, as_published=way.as_published, faps=self.faps)
                 self._tell(f"{target.name}, {way}", 1)
-            onto, points = target.neutral, target.points
+            onto, points = target.neutral, target.points_for(way)
             there = clone(there, onto, points, backend=way.backend, as_published=way.as_published, faps=self.faps)
             self._tell(f"{target.name}, {way}", 1)
             yield there

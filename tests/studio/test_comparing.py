@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,6 +22,8 @@ from samples import sample
 from studio.cli.app import app
 from studio.cli.outcome import Outcome
 from studio.cli.spread import Spread
+from studio.compared_faces import read_model
+from studio.comparison import Way
 from studio.motions import COMBINATIONS, parse_motions
 from studio.render import Figure, make_renderer
 
@@ -149,6 +152,15 @@ def test_a_pair_that_cannot_be_cloned_is_a_finding(tmp_path: Path, monkeypatch: 
         ("default onto tri_head, fit", "no face was found in it")
     ]
     assert (tmp_path / "g.png").exists()
+
+
+def test_a_published_backend_finds_points_in_its_own_way() -> None:
+    given = read_model(str(HEAD))
+    found = replace(given, found=True)
+    assert given.points is not None
+    assert given.points_for(Way("dt", as_published=True)) is given.points
+    assert found.points_for(Way("dt", as_published=True)) is None
+    assert found.points_for(Way("dt")) is found.points_for(Way("vtc", as_published=True)) is given.points
 
 
 def test_a_face_that_cannot_be_used_does_not_lose_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
