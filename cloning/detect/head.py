@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cloning.detect.register import agreement, front, register, stretch, symmetric
 from cloning.detect.samples import Samples, sample, seen
-from cloning.detect.search import Pose, Template, search
+from cloning.detect.search import Pose, Template, apart, search
 from cloning.surface import Surface
 from fba.arrays import Bools, Floats, Ints
 from fba.sphere import fit_sphere
@@ -28,14 +29,19 @@ CANDIDATES = 16
 """Places that are registered; the right one is among the first six on all faces measured, except those below a body's
 clothes."""
 
-QUICK, LONG = 8, 25
-"""Steps of the registration: to choose a candidate, and to place the chosen one."""
+QUICK, LONG = 8, 12
+"""Steps of the registration: to choose a candidate, and to place the chosen one. Twice as many move no face by more
+than 0.007 eye separations, most by less than 0.001."""
 
 ROOM = (1.8, 2.6, 2.6)
 """Half the size of the box around the middle between the eyes that holds a head, in eye separations."""
 
 GRID = 0.08
 """Cell in which the foremost surface hides others, in eye separations."""
+
+CLEAR = 0.8
+"""Agreement after the quick registration above which nothing else is tried; the best place that is no face reaches
+0.76 (on a whole body), and most faces 0.82 to 0.98."""
 
 SURE = 0.7
 """Agreement after the quick registration above which no other part of the file is searched; false places reach 0.65."""
@@ -124,21 +130,38 @@ def find_pose(surface: Surface, model: Model) -> tuple[Pose, bool]:
     pose : the best one; its score tells how much of a face is there.
     reversed : the polygons are wound inside out.
     """
-    quick = model.face.subset(slice(0, 600))
     best: tuple[Pose, bool, Samples] | None = None
     for points in _choices(surface):
-        for start in search(points, model.template, CANDIDATES):
-            view, inside_out = facing(points, start)
-            if len(view.points) < 100:
-                continue
-            pose = register(quick, view, start, QUICK)
+        for pose, inside_out in _registered(points, model):
             if best is None or pose.score > best[0].score:
                 best = pose, inside_out, points
+            if pose.score > CLEAR:
+                break
         if best is not None and best[0].score > SURE:
             break
     if best is None:
         return Pose(np.eye(3), 1.0, np.zeros(3), 0.0), False
     return settle(best[2], model, best[0]), best[1]
+
+
+def _registered(points: Samples, model: Model) -> Iterator[tuple[Pose, bool]]:
+    """Poses in which a face may be, and whether it is inside out there: the best place of each gaze, then others."""
+    quick = model.face.subset(slice(0, 600))
+    found: list[Pose] = []
+    tried: list[Pose] = []
+
+    def tries(poses: list[Pose]) -> Iterator[tuple[Pose, bool]]:
+        for start in poses:
+            tried.append(start)
+            view, inside_out = facing(points, start)
+            if len(view.points) >= 100:
+                yield register(quick, view, start, QUICK), inside_out
+
+    for poses in search(points, model.template):
+        found += poses
+        yield from tries(poses[:1])
+    best = apart(sorted(found, key=lambda p: -p.score), CANDIDATES)
+    yield from tries([pose for pose in best if not any(pose is other for other in tried)])
 
 
 def settle(points: Samples, model: Model, pose: Pose) -> Pose:
@@ -176,14 +199,13 @@ def _within(points: Floats, middle: tuple[float, float, float]) -> Bools:
     return found
 
 
-def _choices(surface: Surface) -> list[Samples]:
+def _choices(surface: Surface) -> Iterator[Samples]:
     """What is searched: the largest piece, then everything."""
-    everything = sample(surface, SAMPLES)
     piece = surface.components()[surface.triangles[:, 0]]
     largest = np.flatnonzero(piece == np.argmax(np.bincount(piece)))
-    if len(largest) == len(piece):
-        return [everything]
-    return [sample(surface, SAMPLES, largest), everything]
+    if len(largest) < len(piece):
+        yield sample(surface, SAMPLES, largest)
+    yield sample(surface, SAMPLES)
 
 
 def isolate(surface: Surface, pose: Pose, inside_out: bool, model: Model) -> Head:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -52,16 +52,15 @@ class Pose:
         return moved
 
 
-def gazes() -> list[Floats]:
-    """The 24 turns (3, 3) that take file axes to head axes; rows = left, up, gaze in file axes."""
-    found = []
-    for up, gaze in product(range(6), repeat=2):
-        if up % 3 == gaze % 3:
-            continue
-        u, g = np.zeros(3), np.zeros(3)
-        u[up % 3], g[gaze % 3] = (1.0 if up < 3 else -1.0), (1.0 if gaze < 3 else -1.0)
-        found.append(np.array([np.cross(u, g), u, g]))
-    return found
+GAZES = ((2, 1.0), (1, -1.0), (1, 1.0), (2, -1.0), (0, 1.0), (0, -1.0))
+"""Axis and sign of the ways a face may look in its file, the usual ones first: most files have y up, others z."""
+
+
+def turns(axis: int, sign: float) -> list[Floats]:
+    """The 4 turns (3, 3) that take file axes to head axes for one gaze; rows = left, up, gaze in file axes."""
+    gaze = sign * np.eye(3)[axis]
+    ups = [way * np.eye(3)[k] for way in (1.0, -1.0) for k in range(3) if k != axis]
+    return [np.array([np.cross(up, gaze), up, gaze]) for up in ups]
 
 
 class Template:
@@ -78,24 +77,22 @@ class Template:
         self.whole = float((self.depth**2).sum())
 
 
-def search(target: Samples, template: Template, count: int) -> list[Pose]:
-    """The best places of a face, best first.
+def search(target: Samples, template: Template) -> Iterator[list[Pose]]:
+    """The places most like a face, best first, for one gaze of `GAZES` after the other.
 
     Parameters
     ----------
     target : points on all of the file's surfaces.
-    count : how many to return; near ones count as one.
     """
     low, high = target.points.min(axis=0), target.points.max(axis=0)
     middle = 0.5 * (low + high)
     extent = float((high - low).max())
     steps = int(np.log(NARROWEST / WIDEST) / np.log(STEP)) + 1
-    turns = gazes()
-    found: list[Pose] = []
-    for gaze in sorted({tuple(t[2]) for t in turns}):
-        same = [t for t in turns if tuple(t[2]) == gaze]
+    for gaze in GAZES:
+        same = turns(*gaze)
         view = (target.points - middle) @ same[0].T
         box = np.array([view[:, :2].min(axis=0), view[:, :2].max(axis=0)])
+        found: list[Pose] = []
         for scale in (WIDEST / extent) * STEP ** np.arange(steps):
             picture = _Picture(view, scale, box, same[0], max(template.mask.shape))
             for turn in same:
@@ -103,8 +100,7 @@ def search(target: Samples, template: Template, count: int) -> list[Pose]:
                     Pose(turn, scale, -turn @ same[0].T @ place - scale * turn @ middle, score)
                     for place, score in picture.places(turn, template)
                 ]
-    found.sort(key=lambda p: -p.score)
-    return _apart(found, count)
+        yield sorted(found, key=lambda p: -p.score)
 
 
 class _Picture:
@@ -121,14 +117,13 @@ class _Picture:
         margin : cells added so that a correlation does not wrap round.
         """
         from scipy.fft import next_fast_len, rfft2
-        from scipy.ndimage import maximum_filter
 
         self.axes = axes
         self.low = scale * box[0] - 1.0
         columns, rows = (int(n) for n in np.ceil((scale * box[1] + 1.0 - self.low) * CELLS))
         some = scale * view[: max(6 * rows * columns, 20_000)]
         depth = depth_map(some[:, :2], some[:, 2], self.low, 1.0 / CELLS, (rows, columns))
-        mask = depth > maximum_filter(depth, 2 * CELLS - 1) - BACKGROUND
+        mask = depth > _foremost(depth, CELLS - 1) - BACKGROUND
         self.base = float(depth[mask].mean())
         depth = np.where(mask, depth - self.base, 0.0)
         self.shape = rows, columns
@@ -171,6 +166,19 @@ class _Picture:
         return 1.0 - error / template.whole - (cells - count) / cells, depth, size
 
 
+def _foremost(depth: Floats, reach: int) -> Floats:
+    """The largest value within so many cells of each, along both axes."""
+    for _ in range(2):
+        # Windows of 2, 4, 8 ... cells, the last one twice so that they overlap: far fewer steps than cells.
+        wide, found = 1, np.pad(depth, ((reach, reach), (0, 0)), constant_values=-np.inf)
+        while wide < 2 * reach + 1:
+            step = min(wide, 2 * reach + 1 - wide)
+            found = np.maximum(found[:-step], found[step:])
+            wide += step
+        depth = found.T
+    return depth
+
+
 def _origin(middle: Floats, roll: int) -> Floats:
     """Where the template's origin lies when the middle of its turned picture lies at `middle`."""
     left, right, bottom, top = WINDOW
@@ -180,8 +188,9 @@ def _origin(middle: Floats, roll: int) -> Floats:
     return found
 
 
-def _apart(poses: list[Pose], count: int) -> list[Pose]:
-    """The first poses that differ from all before in turn, in place by half an eye separation or in scale."""
+def apart(poses: list[Pose], count: int) -> list[Pose]:
+    """The first poses, at most `count`, that differ from all before in turn, in scale or in place by half an eye
+    separation."""
     kept: list[Pose] = []
     for pose in poses:
         if len(kept) == count:
