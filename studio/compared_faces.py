@@ -28,7 +28,7 @@ class Model:
 
     Attributes
     ----------
-    name : the file's, without its extension.
+    name : the file's, without its extension; with its folder where several files have one name.
     path : as given; two models of one path are one face.
     neutral : what was read, a plain scene or a face with tables.
     points : feature points in the file's axes; None where they have to be found.
@@ -67,7 +67,17 @@ def read_models(paths: Sequence[str]) -> tuple[dict[str, Model], list[Finding]]:
             models[path] = model
         except FbaError as error:
             findings.append(Finding("error", "left-out", f"left out: {error}", path))
-    return models, findings
+    return _told_apart(models), findings
+
+
+def _told_apart(models: dict[str, Model]) -> dict[str, Model]:
+    """Files of one name get their folder's before it."""
+    names = [model.name for model in models.values()]
+
+    def name(model: Model) -> str:
+        return model.name if names.count(model.name) == 1 else f"{Path(model.path).absolute().parent.name}/{model.name}"
+
+    return {path: replace(model, name=name(model)) for path, model in models.items()}
 
 
 def _shipped() -> PreparedFace:

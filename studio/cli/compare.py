@@ -34,7 +34,11 @@ def compare(
         typer.Option(help="Faces to clone onto: a column each, as many as follow. Default: the sources themselves."),
     ] = None,
     motion: Annotated[
-        str, typer.Option(help="Motions by commas: surprise, viseme_ih, combination, open_jaw=800+37=100; a grid each.")
+        str,
+        typer.Option(
+            help="Motions by commas, a grid each: surprise, viseme_ih, open_jaw=800+37=100; "
+            "combination: the one of Pandzic's figure 13."
+        ),
     ] = "surprise",
     backends: Annotated[str, typer.Option(help="Backends side by side, by commas, e.g. fit,fmc,vtc; 'all'.")] = "fit",
     as_published: Annotated[

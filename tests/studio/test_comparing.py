@@ -22,7 +22,7 @@ from samples import sample
 from studio.cli.app import app
 from studio.cli.outcome import Outcome
 from studio.cli.spread import Spread
-from studio.compared_faces import read_model
+from studio.compared_faces import read_model, read_models
 from studio.comparison import Way
 from studio.motions import COMBINATIONS, parse_motions
 from studio.render import Figure, make_renderer
@@ -161,6 +161,17 @@ def test_a_published_backend_finds_points_in_its_own_way() -> None:
     assert given.points_for(Way("dt", as_published=True)) is given.points
     assert found.points_for(Way("dt", as_published=True)) is None
     assert found.points_for(Way("dt")) is found.points_for(Way("vtc", as_published=True)) is given.points
+
+
+def test_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    paths = [tmp_path / folder / "head.obj" for folder in "ab"]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_bytes(HEAD.read_bytes())
+        path.with_suffix(".fps.json").write_bytes(HEAD.with_suffix(".fps.json").read_bytes())
+    models, findings = read_models(["default", *map(str, paths)])
+    assert [model.name for model in models.values()] == ["default", "a/head", "b/head"]
+    assert findings == []
 
 
 def test_a_face_that_cannot_be_used_does_not_lose_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
