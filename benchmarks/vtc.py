@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.deformation import BANDS, MOTIONS, STILL, errors, line
+from benchmarks.papers.pictures import save
 from cloning import clone, vtc, vtc_image
 from cloning.deformation import deformation_transfer
 from cloning.prepare import PreparedFace, prepare
@@ -89,7 +90,7 @@ def main() -> None:
     if pictures is not None:
         pictures.mkdir(parents=True, exist_ok=True)
         for name, sheet in (("self_mapping", error_maps(source, face)), ("beside_others", side_by_side(source))):
-            sheet.image().quantize(256).save(pictures / f"vtc_{name}.png", optimize=True)
+            save(sheet.image(), pictures / f"vtc_{name}.png")
     if options.write:
         tables = {"self mapping": self_mapping_table(rows), "speed": speed_table(seconds)}
         put_tables(DOCS / "backends" / "vtc.md", tables)

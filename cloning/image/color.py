@@ -50,9 +50,11 @@ def relit(one: Planes, other: Planes, skin: Bools) -> float:
 
     An expression changes part of a face, another light or exposure most of it.
     """
-    if not skin.any():
+    at = np.flatnonzero(skin)
+    if not len(at):
         return 0.0
-    return float(np.median(np.abs(np.log(np.maximum(one[skin], 1.0) / np.maximum(other[skin], 1.0)))))
+    first, second = (np.maximum(plane.ravel().take(at), 1.0) for plane in (one, other))
+    return float(np.median(np.abs(np.log(first / second))))
 
 
 def is_grey(rgb: UInt8) -> bool:
