@@ -90,9 +90,8 @@ def _peers(found: Mapping[str, Any]) -> Lines:
     fits = [r for r in rows if r["work"].startswith("template fit")]
     if fits:
         error = statistics.median(r["error"] / r["our error"] for r in fits)
-        said.append(
-            f"trimesh's template fits need {_span([r['ratio'] for r in fits])} times as long, error x {error:.1f}"
-        )
+        times = _span([r["ratio"] for r in fits])
+        said.append(f"trimesh's template fits take {times} times as long and err {error:.1f} times as much")
     programs = [r for r in rows if not r["work"].startswith("template fit")]
     if programs:
         count = len({r["peer"] for r in programs})
