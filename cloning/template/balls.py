@@ -32,7 +32,7 @@ FEWEST = 0.05
 TURN = 0.1
 """Points that are looked for again keep their candidates until their normal has moved by this, ..."""
 
-MARGIN = 0.5
+MARGIN = 0.15
 """... and while they have gone no farther than this share of a middling triangle's radius, or come nearer instead."""
 
 

@@ -205,15 +205,15 @@ def _stepped(
     energy = level.energies if schedule.remembers else energies(current, level.triangles)
     rest = level.start if schedule.remembers else current
     system, areas, marks = energy.system(k_s, k_b), energy.areas, level.marks
-    even = np.full(len(marks.goals), 1.0 / max(len(marks.goals), 1))
-    more, right = marks.term(current, k_m * (marks.rows @ areas if schedule.by_area else even))
+    size = k_m * (marks.rows @ areas) if schedule.by_area else k_m / max(len(marks.goals), 1)
+    more, right = marks.term(current, size)
     right = right - system @ (current - rest)
     # A part without any landmark or closest point stays where it is.
     diagonal = LOOSE * areas
     if k_c > 0.0:
         pulled, way = pull.ways(current)
-        size = np.where(pulled, k_c * areas, 0.0)
-        diagonal, right = diagonal + size, right + size[:, None] * way
+        pull_size = np.where(pulled, k_c * areas, 0.0)
+        diagonal, right = diagonal + pull_size, right + pull_size[:, None] * way
     return current + solver.solve(system + more + diags_array(diagonal), right)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,16 +31,22 @@ class Landmarks:
     rows: Any
     goals: Floats
 
-    def term(self, current: Floats, size: Floats) -> tuple[Any, Floats]:
+    @cached_property
+    def _square(self) -> Any:
+        return self.rows.T @ self.rows
+
+    def term(self, current: Floats, size: float | Floats) -> tuple[Any, Floats]:
         """What they add to a system (n, n) and its right side (n, 3).
 
         Parameters
         ----------
         current : (n, 3) the template.
-        size : (k,) weights.
+        size : weight of all, or (k,) weights.
         """
         from scipy.sparse import diags_array
 
+        if isinstance(size, float):
+            return size * self._square, size * (self.rows.T @ (self.goals - self.rows @ current))
         weighted = self.rows.T @ diags_array(size)
         return weighted @ self.rows, weighted @ (self.goals - self.rows @ current)
 
