@@ -109,9 +109,9 @@ def test_what_a_mistake_makes_is_explained_by_it_or_its_like(face: AnimatableFac
         wrong = wrong_of(face, stream, found)
         if wrong:
             made += 1
-            explained = {name for e in explain(face, stream, found, wrong) for name in e.motions}
-            assert explained == set(wrong), mistake.what
-            named += mistake.what in {e.what for e in explain(face, stream, found, wrong)}
+            why = explain(face, stream, found, wrong)
+            assert {name for e in why for name in e.motions} == set(wrong), mistake.what
+            named += mistake.what in {e.what for e in why}
     assert made > 20
     assert named > 0.8 * made
 
