@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,9 @@ from fat.build import build_tables, face_motions
 from fat.conformance import conformance
 from fat.face import AnimatableFace
 from fat.motion import FaceMotion
+from fat.tables import FaceDefTable, FaceDefTables
 from fba.arrays import Floats
+from fba.faps import fap
 from fba.feature_points import FeaturePoints
 from fba.scene import Role
 from formats import read_face, read_scene
@@ -65,8 +68,33 @@ class Bench:
 
     def check(self, spoilt: AnimatableFace) -> dict[str, Verdict]:
         """Every measure of a spoilt copy, beside the good face."""
-        mine = measure(spoilt, 0.0, conformance(spoilt), self.skin, self.points)
-        return {v.code: v for v in verdicts(mine, self.measured, fidelity(spoilt, self.source))}
+        return {v.code: v for v in verdicts(self._measure(spoilt), self.measured, fidelity(spoilt, self.source))}
+
+    def _measure(self, spoilt: AnimatableFace) -> Measured:
+        """Measure a copy; where only motions are spoilt, only these and those of the other side."""
+        good = self.face
+        if spoilt.feature_points is not good.feature_points or spoilt.fapu is not good.fapu:
+            return measure(spoilt, 0.0, conformance(spoilt), self.skin, self.points)
+        changed = {t.key for t in spoilt.tables if not _alike(t, self._rebuilt.tables.get(*t.key))}
+        changed |= {(fap(n).mirror or n, select) for n, select in changed}
+        some = replace(spoilt, tables=FaceDefTables(tuple(t for t in spoilt.tables if t.key in changed)))
+        new = measure(some, 0.0, conformance(some), self.skin, self.points)
+        known = self._good
+        own = {f.fap_id: f for f in known.own} | {f.fap_id: f for f in new.own}
+        rows = {r.key: r for r in known.rows} | {r.key: r for r in new.rows}
+        motions = {m.key: m for m in known.motions} | {m.key: m for m in new.motions}
+        return Measured(spoilt, 0.0, tuple(own.values()), tuple(rows.values()), tuple(motions.values()))
+
+    @cached_property
+    def _rebuilt(self) -> AnimatableFace:
+        """The good face with tables built as a spoilt copy's are, which rounds them."""
+        transforms = {t.key: t.transforms for t in self.face.tables}
+        tables = build_tables(self.face.scene, self.face.fapu, face_motions(self.face), transforms)
+        return replace(self.face, tables=tables)
+
+    @cached_property
+    def _good(self) -> Measured:
+        return measure(self.face, 0.0, conformance(self.face), self.skin, self.points)
 
     def near(self, point: str, reach: float) -> Floats:
         """(n, 1) weights of the skin around a feature point: 1 there, smoothly 0 at a reach in eye separations."""
@@ -74,6 +102,19 @@ class Bench:
         part = np.clip(1.0 - away / reach, 0.0, 1.0)
         weight: Floats = (part * part * (3.0 - 2.0 * part))[:, None]
         return weight
+
+
+def _alike(one: FaceDefTable, other: FaceDefTable | None) -> bool:
+    """Whether two tables move everything alike."""
+    if other is None or one.transforms != other.transforms:
+        return False
+    mine, theirs = ({m.shape: m for m in table.meshes} for table in (one, other))
+    return mine.keys() == theirs.keys() and all(
+        np.array_equal(m.coord_index, theirs[name].coord_index)
+        and np.array_equal(m.interval_borders, theirs[name].interval_borders)
+        and np.array_equal(m.displacements, theirs[name].displacements)
+        for name, m in mine.items()
+    )
 
 
 @dataclass(frozen=True)

@@ -258,7 +258,7 @@ MEASURES: tuple[Measure, ...] = (
         False,
         "share of the triangles before the worse eyeball that cross a triangle of it or lie wholly inside, when it is "
         "made smaller by .02 of its radius, but not at rest, and with no skin before them",
-        f"{_HEADS} (3 where a cornea stands out)",
+        f"{_HEADS} (3.8 more than the source where a cornea stands out)",
     ),
     Measure(
         "in-eyes",
