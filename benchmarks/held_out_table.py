@@ -37,7 +37,7 @@ def dose_lines(doses: Sequence[Dose], found: Outcomes) -> list[str]:
             for related in (True, False)
         )
         own = good.get(dose.its)
-        before = "-" if own is None else f"{own.value:.3g}"
+        before = "-" if own is None else f"**{own.value:.3g}**" if own.failed else f"{own.value:.3g}"
         name = f"{dose.name}, {dose.unit}".rstrip(", ")
         out.append(f"| {name} | {dose.its} | {before} | {'; '.join(values)} | {kin} | {strangers} |")
     return out
@@ -58,15 +58,17 @@ def summary(doses: Sequence[Dose], found: Outcomes) -> str:
 
     def caught(dose: Dose, strength: float) -> bool:
         own = found[dose.name, strength].get(dose.its)
-        return own is not None and own.failed
+        return own is not None and own.failed and not found["nothing", 0.0][dose.its].failed
 
     at_all = [d for d in doses if any(caught(d, s) for s in d.strengths)]
     missed = [d.name for d in doses if d not in at_all]
     firm = [d for d in doses if len(d.strengths) == 1 or caught(d, d.strengths[-2])]
     strangers = [d.name for d in doses if set(_others(d, found)) - set(d.kin)]
     bad = ", ".join(code for code, v in found["nothing", 0.0].items() if v.failed) or "none"
+    spent = sum(d.its in found["nothing", 0.0] and found["nothing", 0.0][d.its].failed for d in doses)
+    apart = f" ({spent} of these measures fail on the good clone already, and so see nothing)" if spent else ""
     return (
-        f"Measures that the good clone fails: {bad}. Of {len(doses)} faults, {len(at_all)} are seen by their "
+        f"Measures that the good clone fails: {bad}{apart}. Of {len(doses)} faults, {len(at_all)} are seen by their "
         f"measure at the grossest strength or before, {len(firm)} at the second grossest. "
         f"Not seen: {'; '.join(missed) or 'none'}. "
         f"An unrelated measure fails for: {'; '.join(strangers) or 'none'}."
