@@ -121,11 +121,7 @@ def clone_with_report(
     CloningError
         If the backend is not known, or the source has no tables or no motion of these FAPs.
     """
-    if not isinstance(source, AnimatableFace):
-        raise CloningError(
-            f"the source '{getattr(source, 'name', source)}' holds no Facial Animation Tables, so it has no motion to "
-            "clone; clone_shapes carries its morph targets"
-        )
+    source = _with_tables(source)
     way = find_backend(backend)
     stages = _Stages(progress, {})
     mine, yours, transfer = _build(
@@ -133,28 +129,15 @@ def clone_with_report(
     )
     wanted = None if faps is None else frozenset(faps)
     motions, turning = _read_source(source, mine.scene, wanted)
-    if not motions and not turning:
-        raise CloningError(
-            f"the source '{source.scene.name}' holds no motion" + (" of these FAPs" if wanted else "") + " to clone"
-        )
     idle = _without_eyeballs(yours.scene)
     motions = [m for m in motions if m.fap_id not in idle]
-    offsets = _carry(transfer, [m.offsets for m in motions], stages)
-    cloned = [replace(m, offsets=o) for m, o in zip(motions, offsets, strict=True) if o]
+    cloned = _carry_motions(transfer, motions, stages)
     rigged, transforms, said = _rig(yours, turning, wanted, as_published)
     whole = exact or as_published
-    tables = stages.run("tables", lambda: _tables(rigged, yours.fapu, cloned, transforms, whole))
-    if not len(tables):
-        raise CloningError(
-            f"the source '{source.scene.name}' holds no motion of these FAPs that '{yours.scene.name}' can take"
-        )
-    face = AnimatableFace(
-        rigged,
-        yours.points,
-        tables,
-        yours.fapu,
-        {**source.notes, "backend": way.name + (" as published" if as_published else ""), "source": source.scene.name},
-    )
+    tables = stages.run("tables", lambda: _tables(rigged, yours.fapu, cloned, transforms, whole, source.scene.name))
+    how = way.name + (" as published" if as_published else "")
+    notes = {**source.notes, "backend": how, "source": source.scene.name}
+    face = AnimatableFace(rigged, yours.points, tables, yours.fapu, notes)
     return face, _report(transfer, way.name, as_published, len(motions), stages, said)
 
 
@@ -221,15 +204,34 @@ def _build(
     return mine, yours, transfer
 
 
+def _with_tables(source: FaceScene | AnimatableFace) -> AnimatableFace:
+    if isinstance(source, AnimatableFace):
+        return source
+    raise CloningError(
+        f"the source '{getattr(source, 'name', source)}' holds no Facial Animation Tables, so it has no motion to "
+        "clone; clone_shapes carries its morph targets"
+    )
+
+
 def _read_source(
     source: AnimatableFace, prepared: FaceScene, wanted: frozenset[int] | None
 ) -> tuple[list[FaceMotion], frozenset[Key]]:
-    """Motions of the source, in terms of the shapes and axes that it has after preparation."""
-    motions = source_motions(source, wanted)
+    """Motions of the source, in terms of the shapes and axes that it has after preparation.
+
+    Raises
+    ------
+    CloningError
+        If there is none.
+    """
+    motions, turning = source_motions(source, wanted), turning_keys(source)
+    if not motions and not turning:
+        raise CloningError(
+            f"the source '{source.scene.name}' holds no motion" + (" of these FAPs" if wanted else "") + " to clone"
+        )
     same = np.array_equal(source.scene.frame.axes, prepared.frame.axes)
     if not same or [s.name for s in source.scene.shapes] != [s.name for s in prepared.shapes]:
         motions = [replace(m, offsets=_reshaped(m.offsets, source.scene, prepared)) for m in motions]
-    return motions, turning_keys(source)
+    return motions, turning
 
 
 def _reshaped(offsets: Mapping[str, Floats], old: FaceScene, new: FaceScene) -> dict[str, Floats]:
@@ -245,6 +247,12 @@ def _carry(transfer: FaceTransfer, motions: Sequence[Mapping[str, Floats]], stag
     offsets = transfer.apply(motions, tick)
     stages.timings["motion"] = perf_counter() - start
     return offsets
+
+
+def _carry_motions(transfer: FaceTransfer, motions: Sequence[FaceMotion], stages: _Stages) -> list[FaceMotion]:
+    """The motions that move something on the target."""
+    offsets = _carry(transfer, [m.offsets for m in motions], stages)
+    return [replace(m, offsets=o) for m, o in zip(motions, offsets, strict=True) if o]
 
 
 def _rig(
@@ -287,10 +295,13 @@ def _tables(
     motions: Sequence[FaceMotion],
     transforms: Mapping[Key, Sequence[FaceDefTransform]],
     exact: bool,
+    source: str,
 ) -> FaceDefTables:
-    if exact:
-        return build_tables(scene, fapu, motions, transforms)
-    return compact(build_tables(scene, fapu, motions, transforms, threshold=STILL), fapu, rounding=ROUNDING)
+    left_out = {} if exact else {"threshold": STILL}
+    tables = build_tables(scene, fapu, motions, transforms, **left_out)
+    if not len(tables):
+        raise CloningError(f"the source '{source}' holds no motion of these FAPs that '{scene.name}' can take")
+    return tables if exact else compact(tables, fapu, rounding=ROUNDING)
 
 
 def _without_eyeballs(scene: FaceScene) -> frozenset[int]:
