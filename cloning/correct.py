@@ -73,8 +73,9 @@ class Correction:
         """
         before = goals - self._at_points(motion)
         active = self._activity(motion, goals)
-        self._add(self.wide, SOFT, before, active, motion)
-        self._add(self.bumps, EXACT, goals - self._at_points(motion), active, motion)
+        wide, narrow = self._on_reached
+        self._add(wide, SOFT, before, active, motion)
+        self._add(narrow, EXACT, goals - self._at_points(motion), active, motion)
         left: Floats = goals - self._at_points(motion)
         return left
 
@@ -83,6 +84,18 @@ class Correction:
         """The vertices that lie on a bump; about a third of a head."""
         found: Ints = np.flatnonzero(np.diff(self.wide.indptr) + np.diff(self.bumps.indptr)).astype(np.int32)
         return found
+
+    @cached_property
+    def _on_reached(self) -> tuple[_Bumps, _Bumps]:
+        """The wide and the narrow bumps on those vertices."""
+        support = self._support[0]
+        wide, narrow = self.wide[self._reached], self.bumps[self._reached]
+        return _Bumps(wide, wide[support].toarray()), _Bumps(narrow, narrow[support].toarray())
+
+    @cached_property
+    def _columns(self) -> Any:
+        """The narrow bumps one by one, on the vertices that bumps reach."""
+        return self._on_reached[1].all.tocsc()
 
     @cached_property
     def _support(self) -> tuple[Ints, Floats]:
@@ -94,20 +107,23 @@ class Correction:
         at: Floats = (self.evaluate @ motion.reshape(len(motion), -1)).reshape(-1, *motion.shape[1:])
         return at
 
-    def _add(self, bumps: Any, ridge: float, missing: Floats, active: Floats, motion: Floats) -> None:
+    def _add(self, bumps: _Bumps, ridge: float, missing: Floats, active: Floats, motion: Floats) -> None:
         """Solve for the heights of the bumps, motion by motion, and add them."""
         k, count = len(self.ids), motion.shape[1]
-        bumps = bumps[self._reached]
         support, at_points = self._support
-        at_support = bumps[support].toarray()
         heights = np.zeros((k, count, 3))
         for m in range(count):
             here = active[support, m]
-            rows = np.clip(at_points @ here / TRUSTED, 0.0, 1.0)[:, None]
-            system = rows * (at_points @ (here[:, None] * at_support))
-            normal = system.T @ system
-            heights[:, m] = _solve(normal, system.T @ (rows * missing[:, m]), ridge, np.abs(missing[:, m]).max())
-        added = (bumps @ heights.reshape(k, -1)).reshape(-1, *motion.shape[1:])
+            rows = np.clip(at_points @ here / TRUSTED, 0.0, 1.0)
+            # Points on skin that rests count nothing, and bumps that reach no moving one stay flat.
+            counted, moving = np.flatnonzero(rows), np.flatnonzero(here)
+            weighted = here[moving, None] * bumps.at_support[moving]
+            raised = np.flatnonzero(weighted.any(axis=0))
+            system = at_points[np.ix_(counted, moving)] @ weighted[:, raised]
+            system *= rows[counted, None]
+            right = system.T @ (rows[counted, None] * missing[counted, m])
+            heights[raised, m] = _solve(system.T @ system, right, k, ridge, np.abs(missing[:, m]).max())
+        added = (bumps.all @ heights.reshape(k, -1)).reshape(-1, *motion.shape[1:])
         added *= active[:, :, None]
         motion[self._reached] += added
 
@@ -118,18 +134,36 @@ class Correction:
         wanted = np.linalg.norm(goals, axis=2)
         limit = np.maximum(ACTIVE * np.maximum(np.sqrt(squared.max(axis=0)), wanted.max(axis=0)), 1e-300)
         active = smooth_step(np.sqrt(squared[self._reached]) / limit)
-        bumps = self.bumps[self._reached]
-        near = np.flatnonzero(np.diff(bumps.indptr))
-        if len(near):
-            around = bumps.data[:, None] * smooth_step(wanted / limit)[bumps.indices]
-            highest = np.maximum.reduceat(around, bumps.indptr[near], axis=0)
-            active[near] = np.maximum(active[near], highest)
+        columns, moves = self._columns, smooth_step(wanted / limit)
+        for k in np.flatnonzero(moves.any(axis=1)):
+            some, own = np.flatnonzero(moves[k]), slice(columns.indptr[k], columns.indptr[k + 1])
+            here = np.ix_(columns.indices[own], some)
+            active[here] = np.maximum(active[here], columns.data[own, None] * moves[k, some])
         return active
 
 
-def _solve(normal: Floats, right: Floats, ridge: float, size: float) -> Floats:
-    """Heights of the bumps; smoother ones where feature points contradict each other on a coarse mesh."""
-    mean = max(float(np.trace(normal)) / len(normal), 1e-30)
+@dataclass(frozen=True, eq=False)
+class _Bumps:
+    """Bumps on the vertices that they reach.
+
+    Attributes
+    ----------
+    all : (r, k) sparse.
+    at_support : (s, k) of the vertices on which feature points lie.
+    """
+
+    all: Any
+    at_support: Floats
+
+
+def _solve(normal: Floats, right: Floats, count: int, ridge: float, size: float) -> Floats:
+    """Heights of the bumps; smoother ones where feature points contradict each other on a coarse mesh.
+
+    Parameters
+    ----------
+    count : of all bumps; those that are not among these stay flat.
+    """
+    mean = max(float(np.trace(normal)) / count, 1e-30)
     while True:
         system = normal.copy()
         system[np.diag_indices(len(system))] += ridge * mean

@@ -180,16 +180,17 @@ class Eye:
         """(s,) distance of the rims at rest; 0 where they were not found."""
         return np.where(self.open, self.heights[0] - self.heights[1], 0.0)
 
-    def travel(self, part: int, offsets: Floats) -> Floats:
+    def travel(self, part: int, offsets: Floats, unit: float = 1.0) -> Floats:
         """Share of the opening that a rim goes towards the other one, (s,); even beyond the open slices.
 
         Parameters
         ----------
         part : 0 upper, 1 lower.
-        offsets : (n, 3) of the whole skin, in eye separations.
+        offsets : (n, 3) of the whole skin.
+        unit : eye separation in the unit of `offsets`.
         """
         lid = self.lids[part]
-        now = lid.rim(lid.rest + offsets[lid.vertices])[0]
+        now = lid.rim(lid.rest + offsets[lid.vertices] / unit)[0]
         used = self.open & np.isfinite(now)
         if not used.any():
             return np.zeros(len(now))
@@ -198,19 +199,24 @@ class Eye:
         travel: Floats = np.interp(row, row[used], share)
         return travel
 
-    def follow(self, part: int, offsets: Floats, travel: Floats, spare: Floats | float) -> Floats:
-        """Offsets (m,) along y that bring a rim a share of the way to the other one.
+    def follow(self, part: int, offsets: Floats, travel: Floats, spare: Floats | float, unit: float = 1.0) -> Floats:
+        """Offsets (m,) along y, in eye separations, that bring a rim a share of the way to the other one.
 
         Parameters
         ----------
         travel : (s,) the least share.
         spare : how much farther it may be, as a share of the opening, (s,) or the same everywhere.
+        unit : eye separation in the unit of `offsets`.
         """
         lid = self.lids[part]
         way = self.heights[1 - part] - self.heights[part]
         goal = self.heights[part] + travel * way
         return lid.lift(
-            lid.rest + offsets[lid.vertices], goal, self.open, spare * np.abs(way), FARTHEST * self.opening.max()
+            lid.rest + offsets[lid.vertices] / unit,
+            goal,
+            self.open,
+            spare * np.abs(way),
+            FARTHEST * self.opening.max(),
         )
 
 
@@ -335,23 +341,23 @@ class RimFollower:
                 continue
             lids = np.concatenate([lid.vertices for lid in mine.lids])
             for k in np.flatnonzero(np.any(source_motion[lids] != 0.0, axis=(0, 2))):
-                self._close(mine, yours, source_motion[:, k] / self.units[0], motion[:, k])
+                self._close(mine, yours, source_motion[:, k], motion[:, k])
 
     def _close(self, mine: Eye, yours: Eye, source_motion: Floats, motion: Floats) -> None:
-        """Correct one motion (n_t, 3) in place, given the source's in eye separations."""
-        gone = [_evened(mine.travel(part, source_motion)) for part in range(2)]
+        """Correct one motion (n_t, 3) in place, given the source's (n_s, 3)."""
+        gone = [_evened(mine.travel(part, source_motion, self.units[0])) for part in range(2)]
         watched = [smooth_step((way.mean() - CLOSES[0]) / (CLOSES[1] - CLOSES[0])) for way in gone]
         if not any(watched):
             return
-        offsets = motion / self.units[1]
-        needed, now = _needed(*gone), [yours.travel(part, offsets) for part in range(2)]
+        es0 = self.units[1]
+        needed, now = _needed(*gone), [yours.travel(part, motion, es0) for part in range(2)]
         met = now[0] + now[1] >= 1.0 + MEETS
         for part in range(2):
             if not watched[part]:
                 continue
             least = np.where(met, np.minimum(needed[part], now[part]), needed[part])
-            lift = yours.follow(part, offsets, least, gone[part] - least + SPARE)
-            motion[yours.lids[part].vertices, 1] += watched[part] * lift * self.units[1]
+            lift = yours.follow(part, motion, least, gone[part] - least + SPARE, es0)
+            motion[yours.lids[part].vertices, 1] += watched[part] * lift * es0
 
 
 def _evened(travel: Floats) -> Floats:
