@@ -119,10 +119,7 @@ class Surface:
 
     def components(self) -> Ints:
         """(n,) number of the connected component, seams closed."""
-        from scipy.sparse.csgraph import connected_components
-
-        found: Ints = connected_components(self.graph, directed=False)[1]
-        return found
+        return _components(*self.polygons, self.vertex_count, self.links)
 
     def distances(self, ids: Iterable[str], limit: float = np.inf, without: Bools | None = None) -> Floats:
         """Distance along the surface from each of these feature points, (k, n); inf where not reached.
@@ -132,7 +129,7 @@ class Surface:
         limit : farther vertices stay inf, in eye separations.
         without : (n,) bool, vertices that no path may use.
         """
-        from scipy.sparse import block_array, coo_array
+        from scipy.sparse import coo_array, csr_array
         from scipy.sparse.csgraph import dijkstra
 
         ids = list(ids)
@@ -141,16 +138,18 @@ class Surface:
         if without is not None:
             keep = coo_array((~without).astype(np.float64)[:, None])
             graph = graph.multiply(keep).multiply(keep.T).tocsr()
-        rows, columns, lengths = [], [], []
-        for k, i in enumerate(ids):
+        # Each point is a row of its own below the graph's, with ways to the vertices that it lies between.
+        ends, columns, lengths = [graph.indptr], [graph.indices], [graph.data]
+        for i in ids:
             vertices, weights = self.points[i]
-            used = weights > 1e-6
-            rows += [k] * int(used.sum())
-            columns += list(vertices[used])
-            lengths += list(np.linalg.norm(self.vertices[vertices[used]] - self.positions[i], axis=1) + 1e-12)
-        doors = coo_array((lengths, (rows, columns)), shape=(len(ids), n))
-        joined = block_array([[graph, None], [doors, coo_array((len(ids), len(ids)))]], format="csr")
-        found: Floats = dijkstra(joined, directed=True, indices=np.arange(n, n + len(ids)), limit=limit)[:, :n]
+            near = vertices[weights > 1e-6]
+            columns.append(near)
+            lengths.append(np.linalg.norm(self.vertices[near] - self.positions[i], axis=1) + 1e-12)
+            ends.append(ends[-1][-1:] + len(near))
+        whole = n + len(ids)
+        parts = np.concatenate(lengths), np.concatenate(columns), np.concatenate(ends)
+        joined = csr_array(parts, shape=(whole, whole))
+        found: Floats = dijkstra(joined, directed=True, indices=np.arange(n, whole), limit=limit)[:, :n]
         return found
 
     def point_matrix(self, ids: Sequence[str]) -> Any:
@@ -275,7 +274,7 @@ def _seams(vertices: Floats, indices: Ints, offsets: Ints, positions: Mapping[st
     if not len(links):
         return links
     near = _distance_to_lines(vertices[links[:, 0]], positions) < 0.02
-    component = _components(indices, offsets, len(vertices))
+    component = _components(indices, offsets, len(vertices), links[:0])
     same = component[links[:, 0]] == component[links[:, 1]]
     kept: Ints = links[~(near & same)]
     return kept
@@ -294,12 +293,15 @@ def seam_links(vertices: Floats, indices: Ints, offsets: Ints, tolerance: float 
     return links
 
 
-def _components(indices: Ints, offsets: Ints, n: int) -> Ints:
+def _components(indices: Ints, offsets: Ints, n: int, links: Ints) -> Ints:
+    """(n,) number of the component that polygons and links make of each vertex."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    first = np.repeat(indices[offsets[:-1]], np.diff(offsets))
-    found: Ints = connected_components(coo_array((np.ones(len(first)), (first, indices)), shape=(n, n)))[1]
+    first = np.concatenate([np.repeat(indices[offsets[:-1]], np.diff(offsets)), links[:, 0]])
+    other = np.concatenate([indices, links[:, 1]])
+    joined = coo_array((np.ones(len(first)), (first, other)), shape=(n, n))
+    found: Ints = connected_components(joined, directed=False)[1]
     return found
 
 

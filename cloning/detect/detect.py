@@ -161,7 +161,7 @@ def _auto(head: Head, source: Source, known: Mapping[str, Floats]) -> _Found:
     differ = {key: float(np.linalg.norm(place - guess[key])) for key, place in ruled.items()}
     places = _evened({**places, **ruled, **known}, known, guess)
     places |= {k: p for k, p in by_neighbours(head.skin, skin, places).items() if k not in known}
-    laid = {k: p for k, p in by_patches(head.skin, skin, places).items() if k not in known}
+    laid = {k: p for k, p in by_patches(head.skin, head.search, skin, places).items() if k not in known}
     places = _evened({**places, **laid}, known, places)
     parted = _parted(places, known, _start(head, skin, known))
     return {**places, **parted}, differ, {**residual, **dict.fromkeys(parted, LIMITS)}
@@ -300,12 +300,11 @@ def _fitted(
     rows = surface.point_matrix(ids)
     places, normals = rows @ vertices, rows @ surface.normals_of(vertices)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    search = TriangleSearch(head.skin.vertices, head.skin.triangles)
-    found = search.closest(places, normals, None, 0.3, LIMITS)
+    found = head.search.closest(places, normals, None, 0.3, LIMITS)
     # Where the target has nothing (the lower jaw of a mask) the source's proportions are the best guess.
     on = np.where(
         (found.triangles >= 0)[:, None],
-        search.positions(found),
+        head.search.positions(found),
         _brought(head, surface, rows @ surface.vertices, known),
     )
     return dict(zip(ids, on, strict=True)), dict(zip(ids, np.minimum(found.distances, LIMITS).tolist(), strict=True))
@@ -315,10 +314,12 @@ def _placed(
     head: Head, surface: Surface, skin: Surface, places: Mapping[str, Floats], trust: Mapping[str, float]
 ) -> dict[str, FeaturePoint]:
     """Points on the scene's own shapes: skin, eyeballs, teeth and tongue."""
-    search = TriangleSearch(head.skin.vertices, head.skin.triangles)
-    near = search.closest(np.array(list(places.values())))
+    near = head.search.closest(np.array(list(places.values())))
     on = {key: (head.vertices[head.skin.triangles[near.triangles[k]]], near.weights[k]) for k, key in enumerate(places)}
-    on |= {key: (head.vertices[corners], weights) for key, (corners, weights) in on_own_lip(head.skin, places).items()}
+    on |= {
+        key: (head.vertices[corners], weights)
+        for key, (corners, weights) in on_own_lip(head.skin, head.search, places).items()
+    }
     trust = {**trust, **dict.fromkeys(PUPILS, EYEBALL)}
     on |= _pupils(head)
     inside = inner_points(head, skin, places)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from cloning.detect.register import agreement, front, register, stretch, symmetr
 from cloning.detect.samples import Samples, sample, seen
 from cloning.detect.search import Pose, Template, apart, search
 from cloning.surface import Surface
+from cloning.template.closest import TriangleSearch
 from fba.arrays import Bools, Floats, Ints
 from fba.sphere import fit_sphere
 
@@ -29,9 +31,9 @@ CANDIDATES = 16
 """Places that are registered; the right one is among the first six on all faces measured, except those below a body's
 clothes."""
 
-QUICK, LONG = 8, 12
-"""Steps of the registration: to choose a candidate, and to place the chosen one. Twice as many move no face by more
-than 0.007 eye separations, most by less than 0.001."""
+QUICK, LONG, LONGEST = 8, 12, 25
+"""Steps of the registration: to choose a candidate, to place the chosen one, and to place one that is not clear. More
+than `LONG` move no clear face by more than 0.003 eye separations."""
 
 ROOM = (1.8, 2.6, 2.6)
 """Half the size of the box around the middle between the eyes that holds a head, in eye separations."""
@@ -100,6 +102,11 @@ class Head:
     eyeballs: tuple[Eyeball | None, Eyeball | None]
     proportions: tuple[Floats, Floats]
 
+    @cached_property
+    def search(self) -> TriangleSearch:
+        """Finds closest points on the skin."""
+        return TriangleSearch(self.skin.vertices, self.skin.triangles)
+
 
 @dataclass(frozen=True, eq=False)
 class Model:
@@ -166,10 +173,11 @@ def _registered(points: Samples, model: Model) -> Iterator[tuple[Pose, bool]]:
 
 def settle(points: Samples, model: Model, pose: Pose) -> Pose:
     """Place a pose exactly, its middle in the target's own plane of symmetry."""
-    pose = register(model.face, facing(points, pose)[0], pose, LONG)
+    steps = LONG if pose.score > CLEAR else LONGEST
+    pose = register(model.face, facing(points, pose)[0], pose, steps)
     for _ in range(2):
-        pose = symmetric(facing(points, pose)[0], pose, LONG)
-        pose = register(model.face, facing(points, pose)[0], pose, LONG, upright=True)
+        pose = symmetric(facing(points, pose)[0], pose, steps)
+        pose = register(model.face, facing(points, pose)[0], pose, steps, upright=True)
     return pose
 
 
@@ -214,7 +222,7 @@ def isolate(surface: Surface, pose: Pose, inside_out: bool, model: Model) -> Hea
     whole = replace(surface, vertices=vertices)
     if inside_out:
         whole = _reversed(whole)
-    piece = whole.components()
+    piece = surface.components()
     near = _within(vertices, (0.0, -0.5, -0.7))
     eyeballs = _eyeballs(whole, piece, near)
     balls = [piece[b.vertices[0]] for b in eyeballs if b is not None]

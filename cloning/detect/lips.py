@@ -14,11 +14,12 @@ LIPS = (("8.1", ("2.2", "2.6", "2.7")), ("8.2", ("2.3", "2.8", "2.9")))
 """Outer middle of each lip, and the points of its inner edge."""
 
 
-def on_own_lip(skin: Surface, places: Mapping[str, Floats]) -> dict[str, tuple[Ints, Floats]]:
+def on_own_lip(skin: Surface, whole: TriangleSearch, places: Mapping[str, Floats]) -> dict[str, tuple[Ints, Floats]]:
     """Place the inner lip points on skin that is nearer, along itself, to their own lip's outer middle.
 
     Parameters
     ----------
+    whole : finds places on the skin.
     places : where the points shall be.
 
     Returns
@@ -30,7 +31,7 @@ def on_own_lip(skin: Surface, places: Mapping[str, Floats]) -> dict[str, tuple[I
     outer = [key for key, _ in LIPS]
     if any(key not in places for key in outer):
         return {}
-    starts = TriangleSearch(skin.vertices, skin.triangles).closest(np.array([places[key] for key in outer]))
+    starts = whole.closest(np.array([places[key] for key in outer]))
     corners = skin.triangles[starts.triangles]
     seeds = corners[np.arange(len(outer)), np.argmax(starts.weights, axis=1)]
     away = dijkstra(skin.graph, indices=seeds)

@@ -90,12 +90,15 @@ class Laid:
         return moved
 
 
-def by_patches(skin: Surface, source: Surface, places: Mapping[str, Floats]) -> dict[str, Floats]:
+def by_patches(
+    skin: Surface, search: TriangleSearch, source: Surface, places: Mapping[str, Floats]
+) -> dict[str, Floats]:
     """Places of ears, skull and jaw corners, (3,) each; only those that the skin has.
 
     Parameters
     ----------
     skin : the target's.
+    search : finds places on it.
     source : a face with all points, its triangles wound to the outside.
     places : of the target's points so far.
     """
@@ -111,7 +114,6 @@ def by_patches(skin: Surface, source: Surface, places: Mapping[str, Floats]) -> 
         found |= {key: 0.5 * (place + places[key]) for key, place in temples.items() if key in places}
     if not found:
         return {}
-    search = TriangleSearch(skin.vertices, skin.triangles)
     on = search.positions(search.closest(np.array(list(found.values()))))
     found = dict(zip(found, on, strict=True))
     return found | _jaws(skin, source.positions, found)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cloning.surface import Surface
-from fba.arrays import Floats, Ints
+from fba.arrays import Floats
 
 TURN = 0.006
 """How far a contour must go back up before the edge counts as passed, in eye separations: less is a wrinkle."""
@@ -111,7 +111,7 @@ class Slicer:
         reaches &= np.maximum(np.maximum(a, b), c) >= low
         near = reaches[:, 0] & reaches[:, 1] & reaches[:, 2]
         # Seams are closed: both copies of a vertex count as one.
-        self._number = _welded(surface)
+        self._number = surface.places.astype(np.int64)
         self._triangles = surface.triangles[near]
         self._vertices = surface.vertices[:, [axis, 1 - axis, 2]]
         self._sides = [np.ascontiguousarray(self._vertices[self._triangles[:, k], 0]) for k in range(3)]
@@ -139,19 +139,12 @@ class Slicer:
 def _joined(keys: Any) -> Any:
     """The other end at each end's edge, from (s, 2) int64 numbers of edges; -1 where there is none."""
     order = np.argsort(keys, axis=None, kind="stable")
-    _, first, count = np.unique(keys.ravel()[order], return_index=True, return_counts=True)
+    numbers = keys.ravel()[order]
+    same = np.zeros(keys.size + 1, bool)
+    same[1:-1] = numbers[1:] == numbers[:-1]
     # An edge of three triangles goes nowhere certain.
-    a, b = order[first[count == 2]], order[first[count == 2] + 1]
+    first = np.flatnonzero(same[1:-1] & ~same[:-2] & ~same[2:])
+    a, b = order[first], order[first + 1]
     found = np.full(keys.size, -1, np.int64)
     found[a], found[b] = b, a
     return found.reshape(keys.shape)
-
-
-def _welded(surface: Surface) -> Ints:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    n = surface.vertex_count
-    links = coo_array((np.ones(len(surface.links)), (surface.links[:, 0], surface.links[:, 1])), shape=(n, n))
-    number: Ints = connected_components(links, directed=False)[1].astype(np.int64)
-    return number

@@ -7,14 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter
 
 from cloning.detect import Detection, detect_points
 from cloning.detect.lips import on_own_lip
 from cloning.detect.model import ready
 from cloning.detect.neighbours import by_neighbours
 from cloning.detect.patches import by_patches
+from cloning.detect.search import GAZES, _foremost, turns
 from cloning.detect.xiang import LANDMARKS
 from cloning.prepare import DERIVED, NECESSARY, PreparedFace, prepare
+from cloning.surface import Surface
+from cloning.template.closest import TriangleSearch
 from fat import AnimatableFace
 from fba import FaceScene, FeaturePoints, PolyMesh, Shape
 from fba.arrays import Floats
@@ -158,7 +162,7 @@ def test_touching_lips_keep_their_own_points(known: PreparedFace) -> None:
     skin = known.skin
     pairs = (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))
     middle = {key: 0.5 * (skin.positions[a] + skin.positions[b]) for a, b in pairs for key in (a, b)}
-    found = on_own_lip(skin, {**skin.positions, **middle})
+    found = on_own_lip(skin, _search(skin), {**skin.positions, **middle})
     upper, lower = skin.distances(["8.1", "8.2"])
     for a, b in pairs:
         assert np.all(upper[found[a][0]] < lower[found[a][0]])
@@ -172,15 +176,15 @@ def test_ears_and_skull_follow_their_shape(known: PreparedFace) -> None:
     """On the source as it is nothing moves; ears that lie elsewhere are found there from where they were."""
     skin = ready(known).skin
     own = skin.positions
-    same = by_patches(skin, skin, own)
+    same = by_patches(skin, _search(skin), skin, own)
     assert {*(f"10.{k}" for k in range(1, 11)), "11.1", "11.4", "11.6", "2.13", "2.14"} <= set(same)
     assert max(float(np.linalg.norm(same[key] - own[key])) for key in same) < 0.01
     off = {key: place + np.array([0.0, 0.05, -0.05]) if key[:2] == "10" else place for key, place in own.items()}
-    again = by_patches(skin, skin, off)
+    again = by_patches(skin, _search(skin), skin, off)
     assert max(float(np.linalg.norm(again[key] - own[key])) for key in again if key[:2] != "11") < 0.03
     # A mask has neither.
     mask = replace(skin, triangles=skin.triangles[skin.vertices[skin.triangles][:, :, 2].min(axis=1) > -0.4])
-    assert by_patches(mask, skin, own) == {}
+    assert by_patches(mask, _search(mask), skin, own) == {}
 
 
 def test_vague_points_are_found_too(
@@ -223,3 +227,22 @@ def test_a_creature_is_refused_without_points(shared: Path, known: PreparedFace)
     assert {key: found[key] for key in given} == dict(given)
     # Left and right, upper and lower: what cloning asks of points, whatever the face.
     prepare(scene, found, "target")
+
+
+def test_every_way_to_look_is_searched_once() -> None:
+    found = [turn for gaze in GAZES for turn in turns(*gaze)]
+    assert len({turn.tobytes() for turn in np.array(found) + 0.0}) == 24
+    assert all(np.isclose(np.linalg.det(turn), 1.0) for turn in found)
+    assert any(np.array_equal(turn, np.eye(3)) for turn in turns(*GAZES[0]))
+
+
+@pytest.mark.parametrize("shape", [(40, 50), (3, 9), (16, 1)])
+def test_the_foremost_depth_around_is_that_of_a_maximum_filter(shape: tuple[int, int]) -> None:
+    depth = np.random.default_rng(0).random(shape)
+    depth[depth < 0.3] = -np.inf
+    for reach in (1, 2, 7):
+        assert np.array_equal(_foremost(depth, reach), maximum_filter(depth, 2 * reach + 1))
+
+
+def _search(skin: Surface) -> TriangleSearch:
+    return TriangleSearch(skin.vertices, skin.triangles)
