@@ -19,7 +19,7 @@ def largest_fold(vertices: Floats, turned: Ints) -> float:
     vertices : (n, 3) at rest; the unit of the result.
     turned : (t, 3) the triangles that turn over.
 
-    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [5, 5, 0], [5, 6, 0]])
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 1, 0], [2, 2, 0]])
     >>> largest_fold(square, np.array([[0, 1, 2], [0, 2, 3], [2, 4, 5]], np.int32))
     1.0
     """

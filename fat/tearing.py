@@ -95,8 +95,8 @@ def reach(vertices: Floats, bends: Ints) -> Floats:
 def stretching(before: Floats, after: Floats) -> Floats:
     """How much longer or shorter edges get (e,): the size of log(after / before), SHORT added to both lengths.
 
-    >>> float(stretching(np.array([0.195]), np.array([0.395])).round(3))
-    0.693
+    >>> stretching(np.array([0.195]), np.array([0.395])).round(3).tolist()
+    [0.693]
     """
     ratio: Floats = np.abs(np.log((after + SHORT) / (before + SHORT)))
     return ratio
