@@ -15,11 +15,9 @@ test: $(VENV)/.installed-test peers
 	$(BIN)/mypy
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile
 
-# One report of fidelity, speed and memory, docs/benchmarks.md, and what it does not hold.
+# One report of fidelity, speed and memory, docs/benchmarks.md, and what it does not hold; PEERS=DIR adds public programs.
 benchmark: $(VENV)/.installed-benchmark
-	$(BIN)/python -m benchmarks.report --write --fidelity
-	$(BIN)/python -m benchmarks.playback
-	$(BIN)/python -m benchmarks.format_speed
+	$(BIN)/python -m benchmarks.report --write --fidelity --against $(if $(PEERS),--peers $(PEERS))
 	$(BIN)/python -m benchmarks.deformation
 
 # Rebuild every shipped face and stream from its origin (needs the package index).
