@@ -176,18 +176,18 @@ def _meshes(
     es0: float,
     inverse: Mapping[str, Floats | None],
 ) -> tuple[FaceDefMesh, ...]:
+    lengths = {value: {name: _lengths(o) for name, o in motion.offsets.items()} for value, motion in motions.items()}
     cutoff = {}
-    for value, motion in motions.items():
-        largest = max((float(_lengths(o).max(initial=0.0)) for o in motion.offsets.values()), default=0.0)
+    for value, parts in lengths.items():
+        largest = max((float(length.max(initial=0.0)) for length in parts.values()), default=0.0)
         cutoff[value] = threshold * min(es0, SMALLEST_SHARE * largest)
     borders = np.array(sorted({0, *motions}), dtype=np.int32)
     meshes = []
     for name, turn in inverse.items():
         kept = np.zeros(0, dtype=bool)
-        for value, motion in motions.items():
-            if name in motion.offsets:
-                lengths = _lengths(motion.offsets[name])
-                moves = (lengths > 0.0) & (lengths >= cutoff[value])
+        for value, parts in lengths.items():
+            if name in parts:
+                moves = (parts[name] > 0.0) & (parts[name] >= cutoff[value])
                 kept = moves if not kept.size else kept | moves
         index = np.flatnonzero(kept).astype(np.int32)
         if not index.size:
