@@ -68,7 +68,8 @@ def worst_places(
             number = "" if value is None else f": {value:.3g}"
             inside = ", cut open" if spot is not None and spot.inside else ""
             mean = f"; mean{number}" if shown is not verdict else f"{inside}{number}"
-            captions.append(f"{name}, {shown.where or 'neutral'}{mean}")
+            seen = shown.where.partition(", ")[0]  # The ring shows where in the face.
+            captions.append(f"{name}, {seen or 'neutral'}{mean}")
         sheet.add_row(f"{verdict.word}  {verdict.measure.title}", pictures, captions)
     return sheet.image()
 
