@@ -33,7 +33,7 @@ def build_transfer(source: PreparedFace, target: PreparedFace, as_published: boo
     search = TriangleSearch(vertices, fine.triangles, None if as_published else fine_labels)
 
     def find(points: Floats, normals: Floats, sides: Ints) -> Places:
-        return search.closest(points, normals, None if as_published else sides, LEAST_FACING)
+        return search.closest(points, normals, None if as_published else sides, LEAST_FACING, FARTHEST)
 
     skin = target.skin
     places = find(skin.vertices, skin.normals, target.labels.values)

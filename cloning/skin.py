@@ -118,16 +118,18 @@ def map_of_places(
     ----------
     refinements, fine : the source, subdivided; source and target lie on each other.
     moved : (n_t, 3) the target's vertices in that common place.
-    places : theirs on `fine`.
+    places : theirs on `fine`; those farther than `FARTHEST` need not be found.
     find : gives the places of points, by their normals and labels.
     scale : (n_t, 3) FAPU ratios in mesh units.
     """
     labels = target_labels.values
     spacing = np.einsum("nk,nk->n", places.weights, _spacing(fine)[fine.triangles[places.triangles]])
-    extra = edge_samples(moved, target.normals_of(moved), target.edges, labels, spacing)
-    more = find(extra.points, extra.normals, labels[extra.owners])
     unmatched = (places.distances > FARTHEST) | (places.facing < LEAST_FACING) | target_labels.between
-    matrix = _matrix(places, more, extra.owners, unmatched, fine)
+    extra = edge_samples(moved, target.normals_of(moved), target.edges, labels, spacing)
+    wanted = ~unmatched[extra.owners]
+    owners = extra.owners[wanted]
+    more = find(extra.points[wanted], extra.normals[wanted], labels[owners])
+    matrix = _matrix(places, more, owners, unmatched, fine)
     if len(target.links):
         matrix = (target.seam_mean @ matrix).tocsr()
         unmatched = (target.seam_mean @ unmatched.astype(float)) > 0.0
