@@ -30,23 +30,15 @@ REASONS: dict[str, str] = {
         "points of its face alone are .075 off ([landmarks.md](landmarks.md))"
     ),
     "points, largest": ("the same: jaw corners and ears of ICT-FaceKit; points of its face alone miss by .24 at most"),
-    "motions, dt, 20k": (
-        "a third is triangular solves of 264 right sides; the rest sets them up and carries the result to the target"
-    ),
+    "motions, dt, 20k": ("a quarter is triangular solves of 264 right sides, a quarter sparse products, both in scipy"),
     "motions, vtc, 20k": "as DT, with a ring more of neighbours in the matrix",
-    "whole clone": (
-        "three fifths are finding the feature points, with two fits of its own, and the fit itself; a face "
-        "whose points are given needs about 3 s less"
-    ),
-    "fit, 5k": (
-        "twenty steps, each with closest points and one factor; nearly half is the exact search for closest "
-        "points, which scipy's tree answers list by list"
-    ),
+    "whole clone": ("half is finding the feature points, with two fits of its own, and the fit itself"),
+    "fit, 5k": "twenty steps, each with closest points and one factor",
     "fit, 20k": "as at 5k, and the two factors of the whole template",
     "frames/s, 20k": (
         "every FAP, two visemes and two expressions at once, other values in each frame, with all combination rules"
     ),
     "analogy, set-up": "one factor of all pixels in the mask and the warp",
-    "analogy, expression": "the warp and composition of the picture, besides one solve",
+    "analogy, expression": "a quarter is one solve; the rest warps and composes the picture",
     "read .wrl, 100k": "text is read number by number in numpy",
 }

@@ -90,7 +90,7 @@ def _numba() -> Check:
     try:
         return Check("compiled loops", True, False, f"numba {version('numba')}")
     except PackageNotFoundError:
-        return Check("compiled loops", False, False, "faster clones and playback: pip install 'fba-toolkit[fast]'")
+        return Check("compiled loops", False, False, "faster correspondences: pip install 'fba-toolkit[fast]'")
 
 
 def detector_check() -> Check:
