@@ -11,6 +11,7 @@ from benchmarks.measures import Bench
 from fat.build import build_tables, face_motions
 from fat.conformance import conformance
 from fat.face import AnimatableFace
+from fat.held_out import NAMED
 from fat.motion import FaceMotion
 from fat.tables import FaceDefTables
 from fba.amplitudes import amplitudes
@@ -92,6 +93,20 @@ def part(motion: FaceMotion) -> float:
 def moved(b: Bench, fap_id: int, where: Floats, way: tuple[float, float, float], select: int = 1) -> AnimatableFace:
     """Skin goes a way more, in eye separations at the amplitude that is measured; where is (n, 1)."""
     return spoilt(b, fap_id, lambda d, m: d + part(m) * where * way, select)
+
+
+def near_unnamed(b: Bench) -> Floats:
+    """(n, 1) 1 at feature points that no FAP names, falling off around them."""
+    keys = [k for k in b.skin.surface.positions if k not in NAMED and b.skin.surface.points.get(k)]
+    near: Floats = np.maximum.reduce([b.near(k, 0.15) for k in keys])
+    return near
+
+
+def lining_pushed(b: Bench, viseme: int, length: float) -> AnimatableFace:
+    """The lining comes forward in a viseme, by a length in eye separations."""
+    lining = np.zeros((b.skin.surface.vertex_count, 1))
+    lining[b.skin.lining] = 1.0
+    return moved(b, 1, lining, (0.0, 0.0, length), select=viseme)
 
 
 def part_moved(b: Bench, fap_id: int, role: Role, way: tuple[float, float, float]) -> AnimatableFace:

@@ -21,9 +21,11 @@ from benchmarks.doses import (
     Dose,
     beside_source,
     leaking,
+    lining_pushed,
     mirrored_about,
     misplaced,
     moved,
+    near_unnamed,
     part_moved,
     rebuilt,
     shaken,
@@ -34,7 +36,6 @@ from benchmarks.doses import (
 from benchmarks.measures import AMOUNT, LIPS, SHAPE, Bench, good_clone
 from fat.build import face_motions
 from fat.face import AnimatableFace
-from fat.held_out import NAMED
 from fba.faps import fap
 from fba.scene import Role
 
@@ -113,15 +114,12 @@ def corner_misplaced(b: Bench, s: float) -> AnimatableFace:
 
 
 def stays_behind(b: Bench, s: float) -> AnimatableFace:
-    keys = [k for k in b.skin.surface.positions if k not in NAMED and b.skin.surface.points.get(k)]
-    stay = np.maximum.reduce([b.near(k, 0.15) for k in keys])
-    return spoilt(b, None, lambda d, m: d * (1.0 - s * stay))
+    near = near_unnamed(b)
+    return spoilt(b, None, lambda d, m: d * (1.0 - s * near))
 
 
 def lining_forward(b: Bench, s: float) -> AnimatableFace:
-    lining = np.zeros((b.skin.surface.vertex_count, 1))
-    lining[b.skin.lining] = 1.0
-    return moved(b, 1, lining, (0.0, 0.0, s), select=10)
+    return lining_pushed(b, 10, s)
 
 
 def lining_left_behind(b: Bench, s: float) -> AnimatableFace:

@@ -20,9 +20,11 @@ from benchmarks.doses import (
     Dose,
     beside_source,
     leaking,
+    lining_pushed,
     mirrored_about,
     misplaced,
     moved,
+    near_unnamed,
     part_moved,
     shaken,
     some_motions,
@@ -32,7 +34,6 @@ from benchmarks.doses import (
 from benchmarks.measures import AMOUNT, LIPS, SHAPE, Bench
 from cloning import clone
 from fat.face import AnimatableFace
-from fat.held_out import NAMED
 from fba.arrays import Floats
 from fba.scene import Role
 from samples.build.makehuman import open_makehuman
@@ -132,15 +133,12 @@ def corner_point_down(b: Bench, s: float) -> AnimatableFace:
 
 
 def goes_too_far(b: Bench, s: float) -> AnimatableFace:
-    keys = [k for k in b.skin.surface.positions if k not in NAMED and b.skin.surface.points.get(k)]
-    further = np.maximum.reduce([b.near(k, 0.15) for k in keys])
-    return spoilt(b, None, lambda d, m: d * (1.0 + s * further))
+    near = near_unnamed(b)
+    return spoilt(b, None, lambda d, m: d * (1.0 + s * near))
 
 
 def lining_forward(b: Bench, s: float) -> AnimatableFace:
-    lining = np.zeros((b.skin.surface.vertex_count, 1))
-    lining[b.skin.lining] = 1.0
-    return moved(b, 1, lining, (0.0, 0.0, s), select=12)
+    return lining_pushed(b, 12, s)
 
 
 def lining_left_behind(b: Bench, s: float) -> AnimatableFace:
