@@ -19,7 +19,10 @@ SWEEPS = 2
 
 
 def factored(matrix: Any) -> Any:
-    """Factor a symmetric positive definite matrix; the result has ``solve(right)``."""
+    """Factor a symmetric positive definite matrix; the result has ``solve(right)``.
+
+    Not `cloning.factors`: on a grid of pixels SuperLU's joined columns hold no zeros, and save a fifth of the time.
+    """
     from scipy.sparse.linalg import splu
 
     return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
